@@ -20,7 +20,7 @@ def test_suggestions_and_profile(
     more = ["--profile", "eta", "--friction", "falling", "--departures"]
     assert main([*arguments, *more, "-o", str(tmp_path / "asked")]) == 0
     printed = capsys.readouterr().out
-    assert "Narrower intervals" in printed
+    assert "Next recordings: each experiment was simulated" in printed
     assert "Profile likelihood of eta" in printed
     suggestions = json.loads((tmp_path / "asked" / "suggestions.json").read_text())
     for one in suggestions["suggestions"]:

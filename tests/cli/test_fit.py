@@ -48,11 +48,11 @@ def test_the_table_has_values_verdicts_agreement_and_prediction(
     held = ["--hold-out", str(folder / "other.csv")]
     assert main(["fit", *list_inputs(folder), *held]) == 0
     shown = capsys.readouterr().out
-    assert "K0 engagement: valid" in shown
+    assert "Model: valid" in shown
     for name in read_json(folder / "k0.truth.json")["truth"]:
         assert name in shown
     assert "identified" in shown
-    assert "other.csv (held out)" in shown
+    assert "other.csv, held out" in shown
     assert "starts led to the best minimum" in shown
 
 

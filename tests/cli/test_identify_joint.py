@@ -78,8 +78,8 @@ def test_the_result_tells_logs_test_and_prediction(written: Written) -> None:
 
 def test_what_is_printed_fits_80_columns(written: Written) -> None:
     results, _, _ = written.printed.partition("wrote")
-    assert "Logs fitted together" in results
-    assert "Held out: predicted, not fitted" in results
+    assert "The logs with their log-specific parameters" in results
+    assert "Errors of the predictions, of the fitted shifts" in results
     assert "The logs agree on their shared parameters" in results
     assert max(len(line) for line in results.splitlines()) <= 80
 

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from drivetwin import cli
-from drivetwin.cli.numbers import format_deviation, format_estimate, format_percent, format_quantity
+from drivetwin.cli.numbers import format_deviation, format_estimate
+from drivetwin.report.blocks import Column, make_table
 
 
 def test_digits_follow_the_interval() -> None:
@@ -26,9 +28,7 @@ def test_a_known_value_has_no_interval() -> None:
 
 
 def test_what_is_not_known_is_a_dash() -> None:
-    assert format_estimate(None, None, "1")[0] == "-"
-    assert format_quantity(None, "N*m") == "-"
-    assert format_percent(float("nan")) == "-"
+    assert format_estimate(None, None, "1")[0] == "–"
 
 
 @pytest.mark.parametrize(
@@ -46,8 +46,9 @@ def test_deviation(value: float | None, truth: float, text: str) -> None:
 
 
 def test_a_negative_zero_has_no_sign() -> None:
-    assert format_percent(-0.04) == format_percent(-0.0) == "0.0"
-    assert format_quantity(-0.0, "N*m") == "0 Nm"
+    columns: Sequence[Column] = (("fit", ".1f"), ("off", "+.2f"), ("size", "3"))
+    ((fit, off, size),) = make_table("", columns, [(-0.04, -0.001, -0.0)]).rows
+    assert (fit.text, off.text, size.text) == ("0.0", "+0.00", "0")
     assert format_estimate(-0.0, (-0.5, 0.5), "N*m")[0] == "0.00"
 
 

@@ -14,7 +14,8 @@ from rich.console import Console
 
 from drivetwin._util.progress import notify_progress
 from drivetwin.cli import main
-from drivetwin.cli.output import make_table, print_line, print_table, show_step
+from drivetwin.cli.output import print_blocks, print_line, show_step
+from drivetwin.report.blocks import make_table
 from tests.cli.conftest import Files
 
 COMMANDS = ("inspect", "shifts")
@@ -40,9 +41,8 @@ def test_texts_are_folded_and_numbers_stay_whole(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "24")
-    table = make_table("title", "name", "value", right=("value",))
-    table.add_row("a_channel_with_a_long_name", "-1234567.25")
-    print_table(table)
+    row = ("a_channel_with_a_long_name", "-1234567.25")
+    print_blocks([make_table("title", ("name", ("value", "s")), [row])])
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 24
     assert any("-1234567.25" in line for line in lines)
@@ -54,10 +54,8 @@ def test_texts_in_brackets_and_between_colons_are_shown_as_they_are(
 ) -> None:
     """As markup a unit `[bar]` would vanish and `[/min]` be an error."""
     monkeypatch.setenv("COLUMNS", "80")
-    table = make_table("of [bar].csv", "column", "unit")
-    table.add_row("PrsBrk2\\XCP:on:1", "[bar]")
-    table.add_row("SpdIn", "[/min]")
-    print_table(table)
+    rows = [("PrsBrk2\\XCP:on:1", "[bar]"), ("SpdIn", "[/min]")]
+    print_blocks([make_table("of [bar].csv", ("column", "unit"), rows)])
     print_line("[bar] :on:")
     text = capsys.readouterr().out
     assert "of [bar].csv" in text

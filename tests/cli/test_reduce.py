@@ -21,7 +21,7 @@ def test_the_table_names_ratios_members_and_errors(capsys: pytest.CaptureFixture
     assert "0.8600" in shown
     assert "Condition (1) is violated" in shown
     assert "R1" in shown
-    assert "estimated before" in shown
+    assert "Largest error over the reference shift" in shown
 
 
 def test_json_holds_the_mass_matrix_and_both_errors(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin._util.display_units import format_significant
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Z95
 from tests.cli.conftest import Files
@@ -52,7 +53,7 @@ def test_the_start_of_each_phase_has_its_95_percent_interval(
     assert main([*command, "--json"]) == 0
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
     half = 1e3 * Z95 * shift["sigma"]["inertia_start"]
-    assert f"± {half:.1f} ms" in rows[0]
+    assert f"± {format_significant(half, 2)} ms" in rows[0]
 
 
 def test_a_resonance_has_the_digits_of_its_interval(

@@ -12,7 +12,7 @@ import pytest
 from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, Points
 from drivetwin.fleet.report import build_ageing_section, render_fleet, write_remark
 from drivetwin.fleet.store import Store
-from drivetwin.report.sections.blocks import FigureBlock
+from drivetwin.report.blocks import FigureBlock
 from tests.fleet.toys import make_logs, run_toys
 
 

@@ -16,8 +16,8 @@ import pytest
 from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
 from drivetwin.findings import render
+from drivetwin.report.blocks import FigureBlock, Section
 from drivetwin.report.html import build_report_sections, render_report, save_report
-from drivetwin.report.sections.blocks import FigureBlock, Section
 from drivetwin.validation.simulate_log import attach_fit
 from tests.report.sample import identification, log, validation
 

@@ -10,8 +10,8 @@ import pytest
 from drivetwin.cli.output import print_findings
 from drivetwin.files.records import FindingRecord
 from drivetwin.findings import Code, make_row, report
-from drivetwin.report.sections.blocks import TableBlock
-from drivetwin.report.sections.parameters import build_findings_section
+from drivetwin.report.blocks import TableBlock
+from drivetwin.report.sections.findings import build_findings_section
 
 ROWS = (
     make_row(shift="2-3", channel="output torque", source="engine torque", size=7.4),

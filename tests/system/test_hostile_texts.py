@@ -18,11 +18,10 @@ from rich.text import Text
 from drivetwin.cli import main
 from drivetwin.cli.output import (
     make_console,
-    make_table,
+    print_blocks,
     print_json,
     print_line,
     print_paragraph,
-    print_table,
     show_error,
 )
 from drivetwin.errors import InputError, Where
@@ -37,10 +36,19 @@ from drivetwin.export.targets import FmiVersion
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from drivetwin.logs.write import write_log
+from drivetwin.report.blocks import (
+    Cell,
+    FigureBlock,
+    NotesBlock,
+    Section,
+    TableBlock,
+    TextBlock,
+    make_notes,
+    make_table,
+)
 from drivetwin.report.figure import Figure
 from drivetwin.report.html import render_page
-from drivetwin.report.notebook import Summary, Table
-from drivetwin.report.sections.blocks import Cell, FigureBlock, NotesBlock, Section, TableBlock
+from drivetwin.report.notebook import Summary
 from tests.export.cases import paper_subject
 
 HOSTILE = {
@@ -102,9 +110,8 @@ def test_terminal(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     print_line(text)
     print_line(text, stderr=True)
     print_paragraph(f"warning: channel {text}")
-    table = make_table(text, text, "value", right=("value",))
-    table.add_row(text, text)
-    print_table(table)
+    table = make_table(text, (text, ("value", "s")), [(Cell(text, note=text), text)])
+    print_blocks([table, TextBlock(text), NotesBlock(text, [text])])
     show_error(InputError(text, text, Where(text, text, 1.0, text)), as_json=False)
     printed = capsys.readouterr()
     assert not find_hidden(printed.out + printed.err)
@@ -217,6 +224,7 @@ def test_html(text: str) -> None:
 
 @hostile
 def test_notebook(text: str) -> None:
-    summary = Summary(text, [Table((text,), [(text,)])], [text])
+    blocks = [make_table(text, (text,), [(text,)]), *make_notes(text, [text])]
+    summary = Summary(text, blocks)
     assert not find_hidden(summary.html + str(summary))
     assert "<script>alert" not in summary.html

@@ -10,8 +10,8 @@ import pytest
 
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.status import ModelStatus
-from drivetwin.report.sections.blocks import Tone
-from drivetwin.report.sections.parameters import STATUS_TONES
+from drivetwin.report.blocks import Tone
+from drivetwin.report.model_verdict import STATUS_TONES
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState

@@ -18,18 +18,9 @@ from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.cli.arguments import RESULT, TWIN, TwinInput
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
-    print_correction,
     to_correction_document,
 )
-from drivetwin.cli.output import (
-    make_table,
-    print_findings,
-    print_json,
-    print_line,
-    print_table,
-    show_step,
-    to_error_document,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, show_step, to_error_document
 from drivetwin.errors import (
     DrivetwinError,
     IdentificationError,
@@ -97,6 +88,7 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
     Where a limit is out of reach, the best calibration found is written and the exit code is 2.
     """
     from drivetwin.calibration.identified_range import check_identified_range
+    from drivetwin.report.calibration import build_calibration_blocks, build_correction_table
 
     model = _load_valid_twin(request.twin)
     task, correction = _build_request(request, model)
@@ -117,10 +109,9 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
         if infeasible is not None:
             raise typer.Exit(infeasible.exit_code)
         return
-    print_correction(correction)
-    _print_results(found)
-    _print_around(*results[1:])
-    print_findings(findings)
+    if correction is not None:
+        print_blocks([build_correction_table(correction)])
+    print_blocks(build_calibration_blocks(found, findings, *results[1:]))
     print_line(f"wrote {output / REPORT}")
     if infeasible is not None:
         raise infeasible
@@ -332,49 +323,6 @@ def _write_results(
         write_text(folder / REPORT, page)
         if len(sources) > 1:
             save_twin(folder / TWIN, twin)
-
-
-def _print_results(found: Calibration) -> None:
-    from drivetwin.calibration.metrics import METRICS
-    from drivetwin.report.figures.calibration import get_metric_display
-
-    numbers = ("95 % before", "95 %", "99 %", "worst")
-    after = found.after.certificate
-    table = make_table(
-        f"Shift on {after.draws} fresh draws ({found.runs} simulated shifts)",
-        "metric", "unit", *numbers, right=numbers,
-    )  # fmt: skip
-    for metric, spec in METRICS.items():
-        display = get_metric_display(metric)
-        old, new = found.before.certificate.quantiles[metric], after.quantiles[metric]
-        values = (old.share_95, new.share_95, new.share_99, new.worst)
-        texts = (f"{value * display.factor:.4g}" for value in values)
-        table.add_row(spec.label, display.label, *texts)
-    print_table(table)
-    for one in after.limits:
-        display = get_metric_display(one.limit.metric)
-        print_line(
-            f"{METRICS[one.limit.metric].label} ({one.limit.statistic.value}): "
-            f"{one.value * display.factor:.4g} {display.label}, limit "
-            f"{one.limit.bound * display.factor:.4g}: {one.text}"
-        )
-    print_line(f"no lock-up in {after.unlocked}, slip after lock-up in {after.relocked} draws")
-
-
-def _print_around(front: Front | None, mapped: OperatingMap | None) -> None:
-    if front is not None:
-        times = [one.time for one in front.points]
-        reach = f", shift time {times[0]:.3f} to {times[-1]:.3f} s" if times else ""
-        print_line(
-            f"front: {len(times)} of {front.tried} calibrations keep the other limits{reach}"
-        )
-    if mapped is not None:
-        jerks = [one.jerk for one in mapped.points.values()]
-        between = [one.jerk for one in mapped.between]
-        print_line(
-            f"map: {len(jerks)} points, peak jerk (95 %) {min(jerks):.3g} to {max(jerks):.3g} "
-            f"m/s³, between them up to {max(between):.3g} m/s³"
-        )
 
 
 def _to_document(results: Results, findings: tuple[Finding, ...], output: Path) -> dict[str, Any]:

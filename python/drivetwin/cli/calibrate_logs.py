@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin.cli.arguments import read_twin_log
-from drivetwin.cli.output import make_table, print_table, show_step
+from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
 
 if TYPE_CHECKING:
@@ -57,20 +57,6 @@ def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[Logg
             Where(file=str(path)),
         )
     return [LoggedShift(log, one) for one in chosen]
-
-
-def print_correction(found: Correction | None) -> None:
-    """Print the deviations of the logged shifts before and after a correction, if there is one."""
-    if found is None:
-        return
-    table = make_table(
-        "Logged shifts: RMS deviation of the simulation",
-        "signal", "unit", "before", "after", right=("before", "after"),
-    )  # fmt: skip
-    for name, before in found.before.items():
-        unit = "N·m" if name.endswith("torque") else "rad/s"
-        table.add_row(name, unit, f"{before:.3g}", f"{found.after[name]:.3g}")
-    print_table(table)
 
 
 def to_correction_document(found: Correction | None) -> dict[str, Any]:

@@ -3,27 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import output_folder
 from drivetwin.cli.arguments import REPORT
-from drivetwin.cli.output import (
-    make_table,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, print_paragraph
 from drivetwin.cli.synth import Bench
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.report.blocks import Column, TableBlock, make_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.dyno.truth import Truth
     from drivetwin.estimation.identification import Identification
 
@@ -62,7 +55,7 @@ def demo(request: Demonstrate, *, as_json: bool) -> None:
             {"parameters": [row.to_document() for row in rows], "log": log, "report": report}
         )
         return
-    print_table(_build_table(rows, scenario))
+    print_blocks([_build_table(rows, scenario)])
     print_paragraph(
         "± is the half width of the 95 % interval; the paper's method states none for its grids."
     )
@@ -147,27 +140,23 @@ def _get_friction(found: Identification, element: str, slip: float) -> _Found:
     return _Found(mu, (low, high) if np.isfinite(high - low) else None)
 
 
-def _build_table(rows: list[_Row], scenario: ScenarioName) -> Table:
+def _build_table(rows: list[_Row], scenario: ScenarioName) -> TableBlock:
     """Truth, and value, interval and deviation of both methods."""
     from drivetwin.cli.numbers import format_deviation, format_estimate
 
-    table = make_table(
-        f"Scenario {scenario}: truth and estimates",
-        "parameter", "truth", "paper", "off %",
-        DEFAULT_METHOD, "95 %", "off %", "unit",
-        right=("truth", "paper", "off %", DEFAULT_METHOD, "95 %"),
-    )  # fmt: skip
+    lines = []
     for row in rows:
         paper, default = row.found[Method.PAPER], row.found[DEFAULT_METHOD]
         value, interval, unit = format_estimate(default.value, default.interval, row.unit)
-        table.add_row(
-            row.id,
-            format_estimate(row.truth, None, row.unit)[0],
-            format_estimate(paper.value, None, row.unit)[0],
-            format_deviation(paper.value, row.truth),
-            value,
-            interval,
-            format_deviation(default.value, row.truth),
-            unit,
+        lines.append(
+            (
+                row.id,
+                format_estimate(row.truth, None, row.unit)[0],
+                format_estimate(paper.value, None, row.unit)[0],
+                format_deviation(paper.value, row.truth),
+                *(value, interval, format_deviation(default.value, row.truth), unit),
+            )
         )
-    return table
+    numbers = ("truth", "paper", "off %", DEFAULT_METHOD.value, "± 95 %", "off %")
+    columns: Sequence[Column] = ("parameter", *((name, "s") for name in numbers), "unit")
+    return make_table(f"Scenario {scenario}: truth and estimates", columns, lines)

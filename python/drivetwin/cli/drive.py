@@ -9,20 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import Request, argument, option, output_folder
 from drivetwin.cli.arguments import GEARBOX_HELP
-from drivetwin.cli.output import (
-    make_table,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-    show_step,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
+from drivetwin.report.blocks import TextBlock, Tone, make_notes
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.drive import DriveRun
-    from drivetwin.drive.result import Maneuver
 
 FIGURE, TRACES = "drive.html", "drive.csv"
 
@@ -64,6 +55,7 @@ def drive(request: Drive, *, as_json: bool) -> None:
         select_powertrain,
     )
     from drivetwin.gearbox import load_gearbox
+    from drivetwin.report.drive import build_energy_table, build_shift_table
 
     box = load_gearbox(request.card)
     chosen = load_powertrain(request.powertrain or select_powertrain(box))
@@ -76,10 +68,8 @@ def drive(request: Drive, *, as_json: bool) -> None:
     if as_json:
         print_json(_to_document(motion) | {"gearbox": box.name, "powertrain": chosen.name})
         return
-    print_table(_build_shift_table(motion, title))
-    print_table(_build_energy_table(motion))
-    for warning in motion.warnings:
-        print_paragraph(f"warning: {warning}")
+    print_blocks([TextBlock(title), build_shift_table(motion), build_energy_table(motion)])
+    print_blocks(make_notes("Warnings", motion.warnings, Tone.DOUBTFUL))
     for file in files:
         print_line(f"wrote {file}")
 
@@ -91,55 +81,6 @@ def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ..
 
     texts = {FIGURE: render_drive(motion, title), TRACES: format_traces(motion)}
     return write_texts(folder, texts)
-
-
-def _build_shift_table(motion: DriveRun, title: str) -> Table:
-    """One row a shift; work and peak power of the off-going, then of the on-coming element."""
-    numbers = ("at s", "slip s", "kJ", "kW", "shaft Nm")
-    table = make_table(title, "shift", "kind", "off on", *numbers, right=numbers)
-    for each in motion.maneuvers:
-        low, high = each.shaft_torque
-        table.add_row(
-            each.action.label,
-            each.action.kind,
-            " ".join(work.element for work in each.work),
-            f"{each.action.start:z.1f}",
-            _format_slip_time(each),
-            " ".join(f"{abs(work.work) / 1e3:.1f}" for work in each.work),
-            " ".join(f"{work.peak_power / 1e3:.0f}" for work in each.work),
-            f"{low:z.0f}..{high:z.0f}",
-        )
-    return table
-
-
-def _format_slip_time(maneuver: Maneuver) -> str:
-    """Format the duration of the inertia phase, if the shift has one."""
-    if maneuver.break_away is None or maneuver.lock is None:
-        return ""
-    return f"{maneuver.lock - maneuver.break_away:.2f}"
-
-
-def _build_energy_table(motion: DriveRun) -> Table:
-    table = make_table("Energy over the drive", "part", "kJ", right=("kJ",))
-    for part, value in _compute_balance(motion).items():
-        table.add_row(part, f"{value / 1e3:z.3f}")
-    return table
-
-
-def _compute_balance(motion: DriveRun) -> dict[str, float]:
-    """The audit, with the friction of shift elements apart from that of brake and rolling."""
-    audit = motion.audit
-    elements = sum(motion.work.values())
-    return {
-        "engine": audit.source,
-        "gain of kinetic and elastic energy": audit.stored,
-        "torque converter": audit.converter,
-        "clutches and brakes of the transmission": elements,
-        "service brake and rolling resistance": audit.friction - elements,
-        "air and grade": audit.load,
-        "damping of the output shaft": audit.shaft,
-        "unexplained": audit.error,
-    }
 
 
 def _to_document(motion: DriveRun) -> dict[str, Any]:

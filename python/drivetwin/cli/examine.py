@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,22 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import Request, flag, input_file, option, output_folder
 from drivetwin.cli.arguments import card_option, log_argument, mapping_option
-from drivetwin.cli.numbers import format_estimate, format_half_width
-from drivetwin.cli.output import (
-    make_table,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-    show_step,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
 from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.blocks import Block, TableBlock, make_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.cli.identify_run import Outcome
     from drivetwin.estimation.analysis.bootstrap import Bootstrap
     from drivetwin.estimation.analysis.friction_dependence import Departure
@@ -88,32 +80,29 @@ def examine(request: Examine, *, as_json: bool) -> None:
         print_json({one.file: json.loads(one.text) for one in answers})
         return
     for one in answers:
-        print_table(one.table)
-        for note in one.notes:
-            print_paragraph(note)
+        print_blocks(one.blocks)
     for file in files:
         print_line(f"wrote {file}")
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """One answer as a file, a table and notes; its `twin`, if any, is written as well."""
+    """One answer as a file and blocks; its `twin`, if any, is written as well."""
 
     file: str
     text: str
-    table: Table
+    blocks: Sequence[Block]
     twin: Twin | None = None
-    notes: Sequence[str] = ()
 
 
 def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
-    from drivetwin.cli.tables import build_suggestion_table, list_limits
     from drivetwin.estimation.analysis.bootstrap import bootstrap
     from drivetwin.estimation.analysis.experiment_design import compute_rankings
     from drivetwin.estimation.analysis.friction_dependence import estimate_departures
     from drivetwin.estimation.analysis.profile_likelihood import compute_profile
     from drivetwin.files import analysis_files
+    from drivetwin.report.sections.identifiability import build_suggestion_blocks
 
     found = outcome.found
     with show_step("comparing experiments"):
@@ -121,8 +110,7 @@ def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
     yield Answer(
         SUGGESTIONS,
         analysis_files.format_suggestions(suggestions),
-        build_suggestion_table(suggestions, found.estimates),
-        notes=list_limits(suggestions),
+        build_suggestion_blocks(suggestions, found.estimates),
     )
     yield from _iterate_interval_answers(found, request, compute_profile, bootstrap)
     if request.friction is not None:
@@ -131,17 +119,17 @@ def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
         with show_step("looking for what departs from the friction law"):
             seen = estimate_departures(found)
         yield Answer(
-            DEPARTURES, analysis_files.format_departures(seen), _build_departure_table(seen)
+            DEPARTURES, analysis_files.format_departures(seen), [_build_departure_table(seen)]
         )
 
 
 def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
     """Friction of a shape, with the twin that has it."""
-    from drivetwin.cli.tables import build_friction_table
     from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
     from drivetwin.estimation.data.prepare import collect_tolerances
     from drivetwin.estimation.likelihood.effects.columns import EffectPriors
     from drivetwin.files.analysis_files import format_friction
+    from drivetwin.report.sections.summary import build_friction_table
     from drivetwin.twin.build import build_twin
 
     found = outcome.found
@@ -150,7 +138,7 @@ def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
         one = fit_friction_shape(found, shape, EffectPriors(outcome.card.effects, tolerances))
     shaped = replace(found, friction={**found.friction, **one.curves})
     twin = build_twin(shaped, outcome.card)
-    return Answer(FRICTION, format_friction(one), build_friction_table(one.curves), twin)
+    return Answer(FRICTION, format_friction(one), [build_friction_table(one.curves)], twin)
 
 
 def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
@@ -170,55 +158,53 @@ def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     return tuple(folder / name for name in names)
 
 
-def _build_profile_table(one: Profile, unit: str) -> Table:
+def _build_profile_table(one: Profile, unit: str) -> TableBlock:
     """Build the table of both intervals of a profile."""
-    table = make_table(
-        f"Profile likelihood of {one.parameter}", "interval (noise)", "from", "to", "unit",
-        right=("from", "to"),
-    )  # fmt: skip
-    half = 0.5 * (one.linear[1] - one.linear[0])
-    for name, ends in (("by profile", one.interval), ("by covariance", one.linear)):
-        low, high = (
-            format_estimate(end, (end - half / 20, end + half / 20), unit)[0] for end in ends
-        )
-        table.add_row(name, low, high, format_estimate(None, None, unit)[2])
-    return table
+    from drivetwin._util.display_units import format_uncertainty, get_display_unit
+
+    display = get_display_unit(unit)
+    half = 0.5 * (one.linear[1] - one.linear[0]) * display.factor
+    rows = [
+        (name, *(format_uncertainty(end * display.factor, half / 10)[0] for end in ends))
+        for name, ends in (("by profile", one.interval), ("by covariance", one.linear))
+    ]
+    columns = ("interval (noise)", ("from", "s", display.label), ("to", "s", display.label))
+    return make_table(f"Profile likelihood of {one.parameter}", columns, rows)
 
 
-def _build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) -> Table:
+def _build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) -> TableBlock:
     """Build the table of the spreads by covariance and by bootstrap."""
     from drivetwin.estimation.result.estimate import Z95
+    from drivetwin.report.sections.identifiability import format_half_width
 
-    title = f"Bootstrap: {len(one.values)} fits, {one.failed} failed"
-    numbers = ("by covariance", "by bootstrap", "bias")
-    table = make_table(title, "parameter", *numbers, "unit", right=numbers)
-    for k, name in enumerate(one.ids):
+    rows = []
+    for name, std, bias in zip(one.ids, one.std, one.bias, strict=True):
         estimate = estimates[name]
-        if one.std[k] == 0.0:
+        if std == 0.0:
             continue
-        linear = Z95 * (estimate.std_noise or float("inf"))
-        table.add_row(
-            name,
-            format_half_width(linear, estimate.unit),
-            format_half_width(Z95 * float(one.std[k]), estimate.unit),
-            f"{one.bias[k] / one.std[k]:+z.2f} σ",
-            format_estimate(None, None, estimate.unit)[2],
-        )
-    return table
+        widths = (Z95 * (estimate.std_noise or math.inf), Z95 * float(std))
+        shown = (format_half_width(width, estimate.unit) for width in widths)
+        rows.append((name, *shown, f"{bias / std:+z.2f} σ"))
+    return make_table(
+        f"Bootstrap: {len(one.values)} fits, {one.failed} failed",
+        ("parameter", ("by covariance", "s"), ("by bootstrap", "s"), ("bias", "s")),
+        rows,
+    )
 
 
-def _build_departure_table(found: tuple[Departure, ...]) -> Table:
+def _build_departure_table(found: tuple[Departure, ...]) -> TableBlock:
     from drivetwin.estimation.analysis.friction_dependence import UNITS
     from drivetwin.estimation.result.estimate import Z95
 
-    table = make_table(
-        "Departures from the friction law", "element", "departure", "value", "± (95 %)", "unit", "",
-        right=("value", "± (95 %)"),
-    )  # fmt: skip
-    for one in found:
-        value, half = f"{one.value:.2g}", f"{Z95 * one.std:.1g}"
-        table.add_row(one.element, one.kind, value, half, UNITS[one.kind], one.text)
-    return table
+    rows = [
+        (one.element, one.kind, one.value, Z95 * one.std, UNITS[one.kind], one.text)
+        for one in found
+    ]
+    return make_table(
+        "Departures from the friction law",
+        ("element", "departure", ("value", ".2g"), ("± 95 %", ".1g"), "unit", ""),
+        rows,
+    )
 
 
 def _iterate_fit_answers(model: Path, request: Examine) -> Iterator[Answer]:
@@ -239,7 +225,7 @@ def _iterate_fit_answers(model: Path, request: Examine) -> Iterator[Answer]:
     yield Answer(
         SUGGESTIONS,
         analysis_files.format_improvements(improvements, units),
-        _build_improvement_table(improvements, units),
+        [_build_improvement_table(improvements, units)],
     )
     yield from _iterate_interval_answers(found, request, compute_profile, bootstrap)
 
@@ -258,28 +244,27 @@ def _iterate_interval_answers(
         with show_step(f"profile likelihood of {name}"):
             one = compute_profile(found, name)
         text = analysis_files.format_profile(one, units[name])
-        yield Answer(f"profile.{name}.json", text, _build_profile_table(one, units[name]))
+        yield Answer(f"profile.{name}.json", text, [_build_profile_table(one, units[name])])
     if request.bootstrap:
         with show_step(f"bootstrap of {request.bootstrap} fits"):
             refits = bootstrap(found, request.bootstrap, request.seed)
         text = analysis_files.format_bootstrap(refits, units)
-        yield Answer(BOOTSTRAP, text, _build_bootstrap_table(refits, found.estimates))
+        yield Answer(BOOTSTRAP, text, [_build_bootstrap_table(refits, found.estimates)])
 
 
-def _build_improvement_table(found: Sequence[Improvement], units: Mapping[str, str]) -> Table:
+def _build_improvement_table(found: Sequence[Improvement], units: Mapping[str, str]) -> TableBlock:
     from drivetwin.fit.examine import REPEATS
+    from drivetwin.report.sections.identifiability import format_half_width
 
-    repeated = f"{REPEATS} recordings"
-    numbers = ("now", repeated, "then")
-    table = make_table(
-        "Narrower intervals", "unknown", "now", repeated, "or exact", "then", "unit", right=numbers
-    )
+    rows = []
     for one in found:
-        unit = units[one.unknown]
         now, several, then = (
-            format_half_width(width, unit) for width in (one.now, one.repeated, one.then)
+            format_half_width(width, units[one.unknown])
+            for width in (one.now, one.repeated, one.then)
         )
-        known = (one.known, then) if one.known else ("–", "")
-        shown = format_estimate(None, None, unit)[2]
-        table.add_row(one.unknown, now, several, *known, shown)
-    return table
+        rows.append((one.unknown, now, several, *((one.known, then) if one.known else ("–", ""))))
+    return make_table(
+        "Narrower intervals, ± 95 %",
+        ("unknown", ("now", "s"), (f"{REPEATS} recordings", "s"), "or exact", ("then", "s")),
+        rows,
+    )

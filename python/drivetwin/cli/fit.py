@@ -10,19 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import FileRole, Request, argument, input_file, option, output_folder
 from drivetwin.cli.arguments import logs_argument
-from drivetwin.cli.output import (
-    make_table,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-    show_findings,
-    show_step,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.files.fit_file import FitFile
     from drivetwin.findings import Finding
     from drivetwin.fit.fit import HeldOut
@@ -127,25 +117,7 @@ def _write_outputs(folder: Path, answer: _Answer, model: str) -> tuple[Path, ...
 
 
 def _print_answer(answer: _Answer) -> None:
-    from drivetwin.cli.tables import build_parameter_table, list_remarks
+    from drivetwin.report.fit import build_fit_blocks
 
-    found = answer.found
-    assert found is not None
-    title = f"{found.model.name}: {found.status.value}, Q per sample {found.chi2:.3f}"
-    print_table(build_parameter_table(found.estimates, title))
-    for remark in list_remarks(found.estimates):
-        print_paragraph(remark)
-    print_table(_build_agreement_table(answer, found))
-    print_line(f"{found.agreeing} of {len(found.starts)} starts led to the best minimum")
-    show_findings((*answer.remarks, *found.findings))
-
-
-def _build_agreement_table(answer: _Answer, found: ModelFit) -> Table:
-    numbers = ("fit %", "rmse")
-    table = make_table("Simulation and recordings", "log", "output", *numbers, right=numbers)
-    rows = list(zip(answer.logs, found.agreement, strict=True))
-    rows += [(f"{name} (held out)", one.agreement) for name, one in (answer.held_out or {}).items()]
-    for log, agreement in rows:
-        for name, one in agreement.items():
-            table.add_row(log, name, f"{one.fit_percent:.1f}", f"{one.rmse:.4g}")
-    return table
+    assert answer.found is not None
+    print_blocks(build_fit_blocks(answer.found, answer.logs, answer.held_out or {}, answer.remarks))

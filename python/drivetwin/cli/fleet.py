@@ -21,20 +21,13 @@ from drivetwin._util.request import (
     output_folder,
 )
 from drivetwin.cli.command_group import CommandGroup
-from drivetwin.cli.output import (
-    make_table,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-    show_step,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
 from drivetwin.errors import INTERRUPTED, InputError
 from drivetwin.fleet.options import FleetOptions
+from drivetwin.report.blocks import make_notes, make_table
 
 if TYPE_CHECKING:
     from drivetwin.fleet.events import Summary
-    from drivetwin.fleet.mixed_model.result import Change, JointEstimate, UnitValue
 
 RUN = "run"
 
@@ -89,7 +82,6 @@ def run(request: RunFleet) -> None:
 
 
 def _print_summary(summary: Summary, output: Path) -> None:
-    table = make_table(f"Fleet in {output}", "logs", "", right=("",))
     rows = {
         "identified": summary.done,
         "bad": summary.bad,
@@ -97,11 +89,8 @@ def _print_summary(summary: Summary, output: Path) -> None:
         "left out by the rules": summary.skipped,
         "computed in this run": summary.computed,
     }
-    for name, count in rows.items():
-        table.add_row(name, str(count))
-    print_table(table)
-    for name, count in summary.failures.items():
-        print_paragraph(f"{count} {name}")
+    print_blocks([make_table(f"Fleet in {output}", ("logs", ("count", "d")), rows.items())])
+    print_blocks(make_notes("Failures", (f"{n} {name}" for name, n in summary.failures.items())))
     if not summary.complete:
         print_line("interrupted; the same command goes on from here")
     elif summary.failures:
@@ -143,91 +132,17 @@ class EstimateFleet(StoreInput, command="fleet estimate"):
 def estimate(request: EstimateFleet, *, as_json: bool) -> None:
     """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
     from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
+    from drivetwin.fleet.report import build_estimate_blocks
     from drivetwin.fleet.store import Store
 
     with show_step("estimating over the fleet"), Store(request.store) as opened:
         found = estimate_fleet(opened, request.parameter)
         missing = list_missing_estimates(opened, found, request.parameter)
+        blocks = build_estimate_blocks(opened, found, missing, request.store)
     if as_json:
         print_json({"estimates": [one.to_document() for one in found], "untold": missing})
         return
-    _print_estimates(found)
-    if missing:
-        print_paragraph(f"too few logs have an estimate of: {', '.join(missing)}")
-
-
-def _print_estimates(found: list[JointEstimate]) -> None:
-    from drivetwin._util.display_units import format_significant, get_display_unit
-    from drivetwin.cli.numbers import format_estimate
-
-    rules = {one.rule for one in found}
-    table = make_table(
-        "Fleet", *(("rule",) if len(rules) > 1 else ()), "parameter", "value", "95 %", "unit",
-        "spread", "drift", "95 % of it", "per",
-        right=("value", "95 %", "spread", "drift", "95 % of it"),
-    )  # fmt: skip
-    for one in found:
-        whose = (one.rule,) if len(rules) > 1 else ()
-        value, interval, unit = format_estimate(one.value, one.ci95, one.si_unit)
-        factor = get_display_unit(one.si_unit).factor
-        spread = "" if one.spread is None else format_significant(one.spread * factor, 2)
-        table.add_row(*whose, one.parameter, value, interval, unit, spread, *_describe_drift(one))
-    print_table(table)
-    for text in dict.fromkeys(text for one in found for text in one.notes):
-        names = dict.fromkeys(one.parameter for one in found if text in one.notes)
-        print_paragraph(text if len(names) == len({one.parameter for one in found}) else
-             f"{', '.join(names)}: {text}")  # fmt: skip
-    for one in found:
-        for change in one.changes:
-            print_paragraph(_describe_change(one, change))
-        for member in one.units:
-            if member.odd:
-                print_paragraph(_describe_outlier(one, member))
-        for outlier in one.outliers:
-            print_paragraph(f"{one.parameter}: {Path(outlier.path).name}: {outlier.reason}")
-
-
-def _describe_change(one: JointEstimate, change: Change) -> str:
-    """Describe the change of a unit."""
-    from drivetwin.fleet.rules import format_span
-
-    step = _format_deviation(one, change.size, change.std)
-    where = format_span(change.field, change.before, change.after)
-    return f"{one.parameter}: unit {change.unit} changed by {step} between {where}"
-
-
-def _describe_outlier(one: JointEstimate, unit: UnitValue) -> str:
-    """Describe the deviation of a unit from the others."""
-    from drivetwin.fleet.figures import format_unit
-
-    return (
-        f"{one.parameter}: unit {format_unit(one, unit)} is "
-        f"{_format_deviation(one, unit.deviation, unit.std)} off, "
-        f"{abs(unit.score or 0.0):.1f} standard "
-        "deviations of the units; it counts in value and spread"
-    )
-
-
-def _format_deviation(one: JointEstimate, size: float, std: float) -> str:
-    """A difference with its 95 % interval and unit."""
-    from drivetwin.cli.numbers import format_estimate
-    from drivetwin.estimation.result.estimate import Z95
-
-    ends = (size - Z95 * std, size + Z95 * std)
-    return " ".join(format_estimate(size, ends, one.si_unit)).removesuffix(" –")
-
-
-def _describe_drift(one: JointEstimate) -> tuple[str, str, str]:
-    """Drift over the first field, its interval, and per what it is."""
-    from drivetwin.cli.numbers import format_estimate
-    from drivetwin.fleet.rules import get_drift_unit
-
-    if not one.drifts:
-        return "", "", ""
-    drift = one.drifts[0]
-    factor, per = get_drift_unit(drift.field)
-    ends = (drift.ci95[0] * factor, drift.ci95[1] * factor)
-    return *format_estimate(drift.slope * factor, ends, one.si_unit)[:2], per
+    print_blocks(blocks)
 
 
 class QueryFleet(StoreInput, command="fleet query"):
@@ -271,10 +186,8 @@ def query(request: QueryFleet, *, as_json: bool) -> None:
         for name, column in zip(answer.columns, zip(*answer.rows, strict=True), strict=False)
         if all(isinstance(cell, int | float | None) for cell in column)
     }
-    table = make_table("", *answer.columns, right=tuple(numbers))
-    for row in answer.rows:
-        table.add_row(*map(_format_cell, row))
-    print_table(table)
+    columns = [(name, "s") if name in numbers else name for name in answer.columns]
+    print_blocks([make_table("", columns, (map(_format_cell, row) for row in answer.rows))])
 
 
 def _format_cell(value: object) -> str:

@@ -9,17 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import Request, argument, option, output_file
 from drivetwin.cli.arguments import GEARBOX_HELP
-from drivetwin.cli.output import (
-    make_table,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line
+from drivetwin.report.blocks import Tone, make_notes
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.gearbox import Gearbox, GearStatics
 
 
@@ -45,6 +38,7 @@ def gearbox(request: ShowGearbox, *, as_json: bool) -> None:
         load_gearbox,
         solve_gear,
     )
+    from drivetwin.report.gearbox import build_gear_blocks, build_ratio_table
 
     if request.card is None:
         names = list_builtin_gearboxes()
@@ -64,13 +58,9 @@ def gearbox(request: ShowGearbox, *, as_json: bool) -> None:
         documents = [_to_document(box, each) for each in gears]
         print_json({"gearbox": box.name, "gears": documents, "warnings": warnings})
         return
-    print_table(_build_ratio_table(box, gears))
-    for warning in warnings:
-        print_paragraph(f"warning: {warning}")
+    print_blocks([build_ratio_table(box, gears), *make_notes("Warnings", warnings, Tone.DOUBTFUL)])
     if gear is not None:
-        print_table(_build_speed_table(gears[0]))
-        print_table(_build_torque_table(gears[0]))
-        print_line(f"Powers sum to zero within {gears[0].power_error:.1e} of the input power.")
+        print_blocks(build_gear_blocks(gears[0]))
 
 
 def _write_modelica(box: Gearbox, path: Path) -> None:
@@ -82,38 +72,6 @@ def _write_modelica(box: Gearbox, path: Path) -> None:
     write_text(
         path, format_package(box.name, build_network_elements(box), note=box.name, ends=ends)
     )
-
-
-def _build_ratio_table(box: Gearbox, gears: list[GearStatics]) -> Table:
-    numbers = ("ratio", "published", "difference %")
-    table = make_table(box.name, "gear", "engaged", *numbers, right=numbers)
-    for each in gears:
-        published = box.get_gear(each.gear).published
-        table.add_row(
-            each.gear,
-            " ".join(each.elements),
-            f"{each.ratio:z.4f}",
-            f"{published:.4g}",
-            f"{100 * (each.ratio / published - 1):+z.2f}",
-        )
-    return table
-
-
-def _build_speed_table(gear: GearStatics) -> Table:
-    table = make_table("Speeds over the input speed", "member", "speed", right=("speed",))
-    for member, speed in gear.speeds.items():
-        table.add_row(member, "idle" if speed is None else f"{speed:z.4f}")
-    return table
-
-
-def _build_torque_table(gear: GearStatics) -> Table:
-    numbers = ("torque", "power")
-    title = "Torques on the members over the input torque, and powers into them"
-    table = make_table(title, "element", "member", *numbers, right=numbers)
-    for flange in gear.flanges:
-        power = flange.torque * (gear.speeds[flange.member] or 0.0)
-        table.add_row(flange.element, flange.member, f"{flange.torque:z.4f}", f"{power:z.4f}")
-    return table
 
 
 def _to_document(box: Gearbox, gear: GearStatics) -> dict[str, Any]:

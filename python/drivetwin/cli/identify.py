@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,22 +14,12 @@ from drivetwin._util.request import flag, option, output_folder
 from drivetwin.cli.arguments import logs_argument
 from drivetwin.cli.atomic_outputs import refuse_same_names
 from drivetwin.cli.identify_run import IdentifyOptions
-from drivetwin.cli.output import (
-    print_findings,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-    print_verdict,
-    show_error,
-    to_error_document,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, show_error, to_error_document
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.status import ModelStatus
 
 if TYPE_CHECKING:
     from drivetwin.estimation.identification import Identification
-    from drivetwin.shifts.shift import Shift
 
 
 NOT_CONFIRMED = 3
@@ -101,25 +91,20 @@ def _identify_log(
     outcome = run_identification(log, how)
     files = () if folder is None else write_outcome(outcome, folder)
     if not as_json:
-        _print_result(outcome.found, {log.name: outcome.found.shifts})
-        for file in files:
-            print_line(f"wrote {file}")
+        _print_result(outcome.found, files)
     return _to_document(outcome.found, files)
 
 
 def _identify_joint(request: Identify, as_json: bool) -> ModelStatus:
     """Fit all logs as one and predict the held-out shifts; return the status of the model."""
-    from drivetwin.cli.identify_joint import identify_logs, print_joint, write_joint
+    from drivetwin.cli.identify_joint import identify_logs, write_joint
 
     outcome = identify_logs(request.logs, request, request.hold_out)
     files = () if request.output is None else write_joint(outcome, request.output)
     if as_json:
         print_json(_to_document(outcome.found, files))
         return outcome.found.status
-    _print_result(outcome.found, outcome.shifts)
-    print_joint(outcome.found)
-    for file in files:
-        print_line(f"wrote {file}")
+    _print_result(outcome.found, files)
     return outcome.found.status
 
 
@@ -143,35 +128,9 @@ def _to_document(found: Identification, files: tuple[Path, ...]) -> dict[str, An
     return {**document, "files": [str(file) for file in files]}
 
 
-def _print_result(found: Identification, shifts: Mapping[str, Sequence[Shift]]) -> None:
-    from drivetwin.cli.tables import (
-        build_fit_table,
-        build_friction_table,
-        build_parameter_table,
-        build_shift_table,
-        build_suggestion_table,
-        list_limits,
-        list_remarks,
-    )
-    from drivetwin.report.model_verdict import explain_identification
+def _print_result(found: Identification, files: Sequence[Path]) -> None:
+    from drivetwin.report.brief import build_identification_blocks
 
-    print_verdict(explain_identification(found))
-    for source, own in shifts.items():
-        print_table(build_shift_table(own, source))
-    print_table(build_parameter_table(found.estimates, f"Parameters ({found.method} method)"))
-    for line in (lines := list_remarks(found.estimates)):
-        print_paragraph(line)
-    if lines:
-        print_line("")
-    if found.friction:
-        print_table(build_friction_table(found.friction))
-    suggestions = found.evidence.suggestions
-    if any(one.best is not None for one in suggestions):
-        print_table(build_suggestion_table(suggestions, found.estimates))
-    for line in (limits := list_limits(suggestions)):
-        print_paragraph(line)
-    if limits:
-        print_line("")
-    if found.fit:
-        print_table(build_fit_table(found.fit, "Simulation over measurement"))
-    print_findings(found.findings)
+    print_blocks(build_identification_blocks(found))
+    for file in files:
+        print_line(f"wrote {file}")

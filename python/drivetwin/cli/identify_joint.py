@@ -13,27 +13,13 @@ from drivetwin._util.progress import scale_progress
 from drivetwin.cli.arguments import REPORT, RESULT, TWIN
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
 from drivetwin.cli.identify_run import IdentifyOptions, read_shifts
-from drivetwin.cli.numbers import format_percent, format_quantity
-from drivetwin.cli.output import (
-    make_table,
-    print_line,
-    print_paragraph,
-    print_table,
-    show_findings,
-    show_step,
-)
+from drivetwin.cli.output import show_findings, show_step
 from drivetwin.errors import InputError, Where
-from drivetwin.report.labels import get_channel_unit
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.estimation.identification import Identification
-    from drivetwin.estimation.result.multi_log import Several
-    from drivetwin.estimation.result.validation import HeldOut
     from drivetwin.shifts.detect import FoundShifts
-    from drivetwin.shifts.shift import Shift
     from drivetwin.validation.multi_log import JointIdentification
 
 
@@ -48,14 +34,6 @@ class Joined:
     def found(self) -> Identification:
         """The identification."""
         return self.made.found
-
-    @property
-    def shifts(self) -> dict[str, tuple[Shift, ...]]:
-        """The shifts that were fitted, by name of their log."""
-        several = self.found.evidence.several
-        if several is None:
-            return {Path(self.made.fitted[0].source).name: self.found.shifts}
-        return {Path(one.source).name: one.shifts for one in several.logs}
 
 
 def identify_logs(
@@ -112,59 +90,6 @@ def write_joint(outcome: Joined, folder: Path) -> tuple[Path, ...]:
             save_twin(beside / name, twin)
         save_joint_report(beside / REPORT, outcome.found, outcome.made.fitted)
     return tuple(folder / name for name in (RESULT, *named, REPORT))
-
-
-def print_joint(found: Identification) -> None:
-    """Print the joint estimates and the prediction of the held-out shifts."""
-    several = found.evidence.several
-    if several is not None:
-        print_table(_build_log_table(several))
-        print_paragraph(several.consistency.text)
-        print_line("")
-    held = found.evidence.held_out
-    if held:
-        print_table(_build_holdout_table(held, found))
-    for one in held:
-        for finding in one.findings:
-            print_paragraph(f"{one.name}: {finding.text}")
-
-
-def _build_log_table(several: Several) -> Table:
-    """Each log with its number, as in parameter ids, and the fit of the common model."""
-    table = make_table("Logs fitted together", "log", "file", "shifts", "fit %", right=("fit %",))
-    for one in several.logs:
-        shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in one.shifts)
-        fit = one.fit.get("output_torque", {}).get("all")
-        shown = format_percent(None if fit is None else fit.fit_percent)
-        table.add_row(str(one.number), Path(one.source).name, shifts, shown)
-    return table
-
-
-def _build_holdout_table(held: Sequence[HeldOut], found: Identification) -> Table:
-    """Tabulate the fit in % of predictions, of the fitted shifts, and of the noise limit."""
-    table = make_table(
-        "Held out: predicted, not fitted",
-        "shift", "signal", "fit %", "fitted %", "rmse", "allowed", "verdict",
-        right=("fit %", "fitted %", "rmse", "allowed"),
-    )  # fmt: skip
-    for one in held:
-        if one.validation is None:
-            table.add_row(one.name, "", "", "", "", "", one.outcome.value)
-            continue
-        for place, (signal, phases) in enumerate(one.validation.fit.items()):
-            fitted = found.fit.get(signal, {}).get("all")
-            bound = one.bounds.get(signal)
-            unit = get_channel_unit(signal)
-            table.add_row(
-                one.name if place == 0 else "",
-                signal.replace("_", " "),
-                format_percent(phases["all"].fit_percent),
-                format_percent(None if fitted is None else fitted.fit_percent),
-                format_quantity(phases["all"].rmse, unit),
-                "" if bound is None else format_quantity(bound.largest, unit),
-                one.get_signal_outcome(signal).value,
-            )
-    return table
 
 
 def parse_holdouts(

@@ -13,21 +13,19 @@ from drivetwin._util.outputs import Output
 from drivetwin._util.request import Request, flag, input_file, option
 from drivetwin.cli.arguments import find_mapping, log_argument, mapping_option
 from drivetwin.cli.output import (
-    make_table,
+    print_blocks,
     print_findings,
     print_json,
     print_line,
     print_paragraph,
-    print_table,
     show_step,
     to_error_document,
 )
 from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
+from drivetwin.report.blocks import TableBlock, make_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.channels.mapping import Mapped
     from drivetwin.channels.mapping_text import Draft
     from drivetwin.logs.raw import Recording
@@ -241,31 +239,21 @@ def _select_shown(columns: Sequence[Column]) -> list[Column]:
 
 def _print_columns(columns: Sequence[Column], source: str) -> None:
     shown = _select_shown(columns)
-    print_table(_build_table(shown, source))
+    print_blocks([_build_table(shown, source)])
     if len(shown) < len(columns):
         more = len(columns) - len(shown)
         print_paragraph(f"{more} more columns, all without a role: --json lists them")
 
 
-def _build_table(columns: Sequence[Column], source: str) -> Table:
-    table = make_table(
-        f"Columns of {source}", "column", "group", "unit", "Hz", "min", "max", "gaps", "role",
-        right=("Hz", "min", "max", "gaps"),
-    )  # fmt: skip
-    for column in columns:
-        low, high = column.range or (None, None)
-        table.add_row(
-            column.name,
-            column.group,
-            column.unit or "none",
-            _format_cell(column.rate),
-            _format_cell(low),
-            _format_cell(high),
-            str(column.gaps),
-            ", ".join(column.roles) or ("ignored" if column.ignored else "-"),
+def _build_table(columns: Sequence[Column], source: str) -> TableBlock:
+    rows = [
+        (
+            *(column.name, column.group, column.unit or "none", column.rate),
+            *(column.range or (None, None)),
+            column.gaps,
+            ", ".join(column.roles) or ("ignored" if column.ignored else "–"),
         )
-    return table
-
-
-def _format_cell(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"
+        for column in columns
+    ]
+    numbers = (("Hz", ".4g"), ("min", ".4g"), ("max", ".4g"), ("gaps", "d"))
+    return make_table(f"Columns of {source}", ("column", "group", "unit", *numbers, "role"), rows)

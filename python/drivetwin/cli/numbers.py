@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
-
-from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
+from drivetwin._util.display_units import format_uncertainty, get_display_unit
 
 Interval = tuple[float, float]
 
@@ -19,32 +17,12 @@ def format_estimate(
     """Value, `± half width` of its interval, and the unit they are in; a dash for None."""
     display = get_display_unit(si_unit)
     if value is None:
-        return "-", "", display.label
+        return "–", "", display.label
     half = None if interval is None else (interval[1] - interval[0]) / 2.0 * display.factor
     if half is not None and half < _EXACT * abs(value * display.factor):
         half = None
     number, width = format_uncertainty(value * display.factor, half)
     return number, f"± {width}" if width else "", display.label
-
-
-def format_quantity(value: float | None, si_unit: str) -> str:
-    """A value with its unit to three digits; a dash for None."""
-    if value is None:
-        return "-"
-    display = get_display_unit(si_unit)
-    return f"{format_significant(value * display.factor, 3)} {display.label}".rstrip()
-
-
-def format_half_width(half: float, si_unit: str) -> str:
-    """`± half width` of an interval in display units; `open` where infinite."""
-    if half == float("inf"):
-        return "open"
-    return format_estimate(half, (-half, half), si_unit)[1]
-
-
-def format_percent(value: float | None) -> str:
-    """A share in percent with one decimal; a dash for None or NaN."""
-    return "-" if value is None or not isfinite(value) else f"{value:z.1f}"
 
 
 def format_deviation(value: float | None, truth: float) -> str:

@@ -11,20 +11,11 @@ from typing import TYPE_CHECKING, Any
 from drivetwin._util.outputs import LOG_ENDINGS, PAGE, select_outputs
 from drivetwin._util.request import option, output_file
 from drivetwin.cli.arguments import TwinLogInput, read_twin_log
-from drivetwin.cli.output import (
-    make_table,
-    print_json,
-    print_line,
-    print_paragraph,
-    print_table,
-    show_step,
-)
+from drivetwin.cli.output import print_blocks, print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import DamagedChannelError
 from drivetwin.observer.kind import Observer
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.logs.raw import RawChannel
     from drivetwin.observer.result import Observation
     from drivetwin.shifts.shift import Shift
@@ -55,7 +46,7 @@ def observe(request: Observe, *, as_json: bool) -> None:
     from drivetwin._util.atomic import write_text
     from drivetwin.files.twin_file import load_twin
     from drivetwin.observer.observe import estimate_torques
-    from drivetwin.report.observer import render_observations
+    from drivetwin.report.observer import build_torque_blocks, render_observations
     from drivetwin.shifts.detect import require_shifts
 
     model, by = load_twin(request.twin), request.by
@@ -73,9 +64,7 @@ def observe(request: Observe, *, as_json: bool) -> None:
         print_json({"observer": by, "shifts": shown, "left_out": left_out})
         return
     for one in found:
-        print_table(_build_table(one))
-        for text in one.notes:
-            print_paragraph(text)
+        print_blocks(build_torque_blocks(one))
     for name, reason in left_out.items():
         print_paragraph(f"shift {name} is left out: {reason}")
     for file in request.output:
@@ -137,25 +126,6 @@ def collect_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
         )
         for name, pieces in parts.items()
     )
-
-
-def _build_table(one: Observation) -> Table:
-    numbers = ("lowest Nm", "highest Nm", "± Nm (mean)", "± Nm (largest)")
-    shift = one.shift
-    table = make_table(
-        f"Shift {shift.start_gear}→{shift.end_gear} by {one.observer}", "torque", *numbers,
-        right=numbers,
-    )  # fmt: skip
-    for name, band in one.bands.items():
-        half = band.upper - band.value
-        table.add_row(
-            name,
-            f"{band.value.min():z.0f}",
-            f"{band.value.max():z.0f}",
-            f"{half.mean():z.1f}",
-            f"{half.max():z.1f}",
-        )
-    return table
 
 
 def _to_document(one: Observation) -> dict[str, Any]:

@@ -7,25 +7,16 @@ import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.visible_text import escape_json
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.result.status import ModelStatus
-from drivetwin.findings import Finding, sort_by_severity
+from drivetwin.findings import Finding
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
-    from drivetwin.report.model_verdict import ModelVerdict
-
-_STATUS_COLOURS = {
-    ModelStatus.VALID: "green",
-    ModelStatus.LIMITED: "yellow",
-    ModelStatus.NOT_VALID: "red",
-    ModelStatus.NOT_VALIDATED: "yellow",
-}
+    from drivetwin.report.blocks import Block
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -34,7 +25,7 @@ def make_console(*, stderr: bool = False) -> Console:
     Texts are shown as they are: a unit in brackets, `[/min]`, is no markup and `:on:` no picture.
     Characters without a glyph, which a terminal might obey, are shown as escapes.
     """
-    from drivetwin.cli.escaping_console import EscapingConsole
+    from drivetwin._util.escaping_console import EscapingConsole
 
     return EscapingConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
 
@@ -52,37 +43,18 @@ def print_paragraph(text: str) -> None:
     make_console().print(Padding(Text(text), (0, 0, 0, 2)))
 
 
-def print_table(table: Table) -> None:
-    """Print a table on stdout; its title is wrapped to the terminal, not to a narrow table."""
-    from rich.text import Text
+def print_blocks(blocks: Iterable[Block]) -> None:
+    """Print the blocks of a result on stdout."""
+    from drivetwin.report import text
 
-    out, title = make_console(), table.title
-    table.title = None
-    if title:
-        out.print(Text(str(title), style="table.title"))
-    out.print(table)
+    text.print_blocks(make_console(), blocks)
 
 
-def make_table(title: str, *columns: str, right: tuple[str, ...] = ()) -> Table:
-    """Empty table in the program's one style; columns in `right` hold numbers.
+def print_findings(findings: Iterable[Finding]) -> None:
+    """Print findings with their tables by severity, the gravest first."""
+    from drivetwin.report.sections.findings import build_findings_section
 
-    Where the terminal is narrow texts are folded; a number stays whole as long as it can.
-    """
-    from rich import box
-    from rich.table import Table
-
-    table = Table(
-        title=title,
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        collapse_padding=True,
-    )
-    for column in columns:
-        number = column in right
-        justify: Literal["left", "right"] = "right" if number else "left"
-        table.add_column(column, justify=justify, no_wrap=number, overflow="fold")
-    return table
+    print_blocks(build_findings_section(tuple(findings)).blocks)
 
 
 def print_json(value: Mapping[str, Any]) -> None:
@@ -111,30 +83,6 @@ def show_step(text: str) -> Iterator[None]:
         live.add_task("", total=None, clock=clock)
         with attach_listener(clock.update):
             yield
-
-
-def print_verdict(verdict: ModelVerdict) -> None:
-    """Print the verdict on a model: status in colour, reason and next action."""
-    from rich.text import Text
-
-    out = make_console()
-    out.print(Text(f"Model: {verdict.status}", style=f"bold {_STATUS_COLOURS[verdict.status]}"))
-    print_paragraph(verdict.reason)
-    print_paragraph(verdict.action)
-    out.print()
-
-
-def print_findings(findings: Iterable[Finding]) -> None:
-    """Print findings with severity and table, the gravest first, each on its own line."""
-    from rich.padding import Padding
-
-    for one in sort_by_severity(findings):
-        print_paragraph(f"{one.severity}: {one.text}")
-        if one.rows:
-            table = make_table("", *one.heads)
-            for cells in one.cells:
-                table.add_row(*cells)
-            make_console().print(Padding(table, (0, 0, 0, 4)))
 
 
 def show_findings(findings: Iterable[Finding]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from drivetwin._util.outputs import PAGE
 from drivetwin._util.request import Request, argument, output_file
 from drivetwin.cli.arguments import REPORT, RESULT, mapping_option, read_twin_log
-from drivetwin.cli.output import print_json, print_line, print_verdict, show_step
+from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
 from drivetwin.errors import InputError, ResultFileError, Where
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _is_identification(source: Path) -> bool:
 def _print_page_name(source: Path, *, as_json: bool) -> None:
     """Print verdict and path of the report of an identification."""
     from drivetwin.files.result_file import load_result
-    from drivetwin.report.model_verdict import explain_result
+    from drivetwin.report.model_verdict import build_verdict_block, explain_result
 
     result = source / RESULT if source.is_dir() else source
     content = load_result(result)
@@ -86,7 +86,7 @@ def _print_page_name(source: Path, *, as_json: bool) -> None:
             {"report": page, "result": result, "inputs": content.inputs, "verdict": vars(verdict)}
         )
         return
-    print_verdict(verdict)
+    print_blocks([build_verdict_block(verdict)])
     print_line(str(page))
 
 

@@ -13,17 +13,16 @@ from drivetwin._util.outputs import PAGE
 from drivetwin._util.request import output_file
 from drivetwin.cli.arguments import LogInput, find_mapping
 from drivetwin.cli.output import (
+    print_blocks,
     print_findings,
     print_json,
     print_line,
     print_paragraph,
-    print_table,
     show_step,
 )
+from drivetwin.report.blocks import TableBlock, make_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.estimation.linear.inertia_in_gear import HeldGear
     from drivetwin.estimation.linear.resonance import Resonance
@@ -48,11 +47,12 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     and the total inertia over η in each gear held, as far as the log determines them.
     """
     from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.cli.tables import build_shift_table
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.read import read_log
+    from drivetwin.report.sections.summary import build_phase_table
     from drivetwin.shifts.detect import detect_shifts, find_gear_spans
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
+    from drivetwin.shifts.shift import make_shift_labels
     from drivetwin.vehicle.card import load_card
 
     log, output = request.log, request.output
@@ -69,9 +69,9 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
         remarks = {"findings": dump_findings(recording.findings)}
         print_json(_to_document(found, closings, seen) | remarks)
         return
-    if found.shifts:
-        print_table(build_shift_table(found.shifts, log.name))
-    else:
+    labels = make_shift_labels(found.shifts)
+    print_blocks(build_phase_table(*one) for one in zip(labels, found.shifts, strict=True))
+    if not found.shifts:
         held = ", ".join(dict.fromkeys(gear for gear, _ in find_gear_spans(recording, card)))
         print_paragraph(f"no gear shift; gear held: {held or 'none'}")
     _print_details(found, closings, seen)
@@ -133,21 +133,19 @@ def _to_document(
 
 def _print_details(found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults) -> None:
     """Print the details below the table of the shifts: text and further tables."""
-    from drivetwin.cli.tables import build_quality_tables, build_summary_tables
+    from drivetwin.report.whole_drive import build_quality_tables, build_summary_tables
     from drivetwin.shifts.summary import summarize_shifts
 
-    for table in build_quality_tables(found.shifts):
-        print_table(table)
+    print_blocks(build_quality_tables(found.shifts))
     if len(found.shifts) > 1:
-        for table in build_summary_tables(summarize_shifts(found.shifts)):
-            print_table(table)
+        print_blocks(build_summary_tables(summarize_shifts(found.shifts)).values())
     for closing in closings:
         text = f"; {closing.warning}" if closing.warning else ""
         print_paragraph(
             f"converter lock-up at {_format_spread(closing.time, closing.sigma)} s (95 %){text}"
         )
     if seen.gears:
-        print_table(_build_gear_table(seen.gears))
+        print_blocks([_build_gear_table(seen.gears)])
     for gear in seen.gears:
         if gear.reason:
             print_paragraph(f"gear {gear.gear}: {gear.reason}")
@@ -207,21 +205,15 @@ def _convert_resonance(shift: Shift, swing: Resonance | str) -> dict[str, Any]:
     return {"from": shift.start_gear, "to": shift.end_gear, **found}
 
 
-def _build_gear_table(gears: tuple[HeldGear, ...]) -> Table:
-    from drivetwin.cli.numbers import format_estimate
-    from drivetwin.cli.output import make_table
-
-    table = make_table(
-        "Total inertia over η at the output shaft", "gear", "from s", "to s", "value", "95 %",
-        "unit", "verdict", right=("from s", "to s", "value", "95 %"),
-    )  # fmt: skip
+def _build_gear_table(gears: Sequence[HeldGear]) -> TableBlock:
+    rows = []
     for one in gears:
-        interval = None
-        if one.value is not None and one.half is not None:
-            interval = (one.value - one.half, one.value + one.half)
-        value, spread, unit = format_estimate(one.value, interval, "kg*m^2")
-        start, end = one.span
-        table.add_row(
-            one.gear, f"{start:z.2f}", f"{end:z.2f}", value, spread, unit, one.verdict.value
-        )
-    return table
+        value, half = "–", ""
+        if one.value is not None:
+            value, half = format_uncertainty(one.value, one.half)
+        rows.append((one.gear, *one.span, value, half, one.verdict.value))
+    columns = (
+        *("gear", ("from s", "z.2f"), ("to s", "z.2f")),
+        *(("value", "s"), ("± 95 %", "s"), "verdict"),
+    )
+    return make_table("Total inertia over η at the output shaft, kg·m²", columns, rows)

@@ -10,13 +10,7 @@ from typing import TYPE_CHECKING
 from drivetwin._util.outputs import PAGE, select_outputs
 from drivetwin._util.request import flag, input_file, option, output_file
 from drivetwin.cli.arguments import TwinLogInput, read_twin_log
-from drivetwin.cli.output import (
-    print_findings,
-    print_json,
-    print_line,
-    print_table,
-    show_step,
-)
+from drivetwin.cli.output import print_blocks, print_findings, print_json, print_line, show_step
 from drivetwin.export.targets import DEFAULT_STEP, InputKind
 
 if TYPE_CHECKING:
@@ -57,9 +51,9 @@ def simulate(request: Simulate, *, as_json: bool) -> None:
     identification. Ratios and shift elements are those of the twin; a vehicle card is not needed.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.cli.tables import build_fit_table
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
     from drivetwin.files.twin_file import load_twin
+    from drivetwin.report.sections.fits import build_fit_table
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.command_pressures import replace_pressures
     from drivetwin.validation.simulate_log import format_signals, simulate_shift
@@ -87,11 +81,8 @@ def simulate(request: Simulate, *, as_json: bool) -> None:
         print_json({"shifts": [_to_document(run) for run in runs]})
         return
     for run in runs:
-        print_table(
-            build_fit_table(
-                run.fit, f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"
-            )
-        )
+        title = f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"
+        print_blocks([build_fit_table(run.fit, title)])
         print_findings(run.findings)
     for file in request.output:
         print_line(f"wrote {file}")

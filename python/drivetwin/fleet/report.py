@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,21 +29,24 @@ from drivetwin.fleet.rules import format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.report.figures.friction import plot_friction
-from drivetwin.report.html import render_page
-from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.blocks import (
+from drivetwin.report.blocks import (
     Block,
     Cell,
     FigureBlock,
     NotesBlock,
     Section,
-    TableBlock,
     Tile,
     TilesBlock,
     Tone,
-    make_cells,
+    make_badge,
+    make_notes,
+    make_number,
+    make_table,
 )
+from drivetwin.report.figures.friction import plot_friction
+from drivetwin.report.html import render_page
+from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.sections.parameters import make_parameter_cell
 
 PAGE = "report.html"
 
@@ -109,18 +113,25 @@ def _build_overview(store: Store) -> Section:
         "SELECT error, count(*) AS n, min(what) FROM files JOIN logs USING (log) "
         "WHERE error != '' GROUP BY error ORDER BY n DESC"
     )
-    rows = [
-        (Cell(error), Cell(str(n), number=True), Cell(what))
-        for error, n, what in store.index.select(sql)
-    ]
+    rows = list(store.index.select(sql))
     blocks: list[Block] = [TilesBlock(tiles)]
     if rows:
-        head = (*make_cells("reason"), Cell("logs", number=True), *make_cells("for example"))
-        blocks.append(TableBlock("Why logs failed.", head, rows))
+        columns = ("reason", ("logs", "d"), "for example")
+        blocks.append(make_table("Why logs failed.", columns, rows))
     return Section("fleet", "The fleet", "What was there, and what became of it.", blocks)
 
 
 _SHIFTS = "SELECT count(*) FROM shifts WHERE state = 'used' AND log IN (SELECT log FROM files)"
+
+
+def build_estimate_blocks(
+    store: Store, found: Sequence[JointEstimate], missing: Sequence[str], folder: Path
+) -> list[Block]:
+    """Shared values, and what is odd; `folder` is that of the page, to which links are relative."""
+    return [
+        *_build_parameters_section(found, missing).blocks,
+        *_build_outlier_section(store, found, folder).blocks,
+    ]
 
 
 def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[str]) -> Section:
@@ -129,19 +140,16 @@ def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[
     notes = dict.fromkeys(note for one in found for note in one.notes)
     shared = [note for note in notes if all(note in one.notes for one in found)]
     rows = [_build_parameter_row(one, shared, several=several) for one in found]
-    head = (
-        Cell("parameter"), Cell("logs", number=True), Cell("fleet's mean", number=True),
-        Cell("± 95 %", number=True), Cell("unit"), Cell("spread of units, 1 σ", number=True),
-        Cell(f"drift per {per}" if per else "drift", number=True), Cell("remark"),
-    )  # fmt: skip
+    columns = (
+        *("parameter", ("logs", "d"), ("fleet's mean", "s"), ("± 95 %", "s"), "unit"),
+        *(("spread of units, 1 σ", "s"), (f"drift per {per}" if per else "drift", "s"), "remark"),
+    )
     blocks: list[Block] = []
     if rows:
-        blocks.append(TableBlock("Shared values, at the fields' means.", head, rows))
-    if shared:
-        blocks.append(NotesBlock("Of all parameters", shared))
-    if missing:
-        names = ", ".join(map(get_parameter_label, missing))
-        blocks.append(NotesBlock("Too few logs with a value of their own", [names]))
+        blocks.append(make_table("Shared values, at the fields' means.", columns, rows))
+    blocks += make_notes("Of all parameters", shared)
+    names = ", ".join(map(get_parameter_label, missing))
+    blocks += make_notes("Too few logs with a value of their own", [names] if names else [])
     return Section(
         "parameters",
         "What the logs say together",
@@ -157,7 +165,7 @@ def _has_several_rules(found: Sequence[JointEstimate]) -> bool:
 
 def _build_parameter_row(
     one: JointEstimate, shared: Sequence[str], *, several: bool
-) -> tuple[Cell, ...]:
+) -> tuple[object, ...]:
     display = get_display_unit(one.si_unit)
     value, half = format_uncertainty(
         one.value * display.factor, 0.5 * (one.ci95[1] - one.ci95[0]) * display.factor
@@ -174,19 +182,14 @@ def _build_parameter_row(
             one.drifts[0].slope * factor, 0.5 * (ends[1] - ends[0]) * factor
         )
         note = f"± {note}"
+    name = make_parameter_cell(one.parameter)
     meaning = get_parameter_spec(one.parameter).meaning
     return (
-        Cell(
-            get_parameter_label(one.parameter),
-            note=f"{meaning} · {one.rule}" if several else meaning,
-        ),
-        Cell(str(one.logs), number=True),
-        Cell(value, number=True),
-        Cell(half, number=True),
-        Cell(display.label),
-        Cell(spread, number=True, note=between),
-        Cell(slope, number=True, note=note),
-        Cell(write_remark(one, shared)),
+        replace(name, remark=f"{meaning} · {one.rule}" if several else meaning),
+        *(one.logs, value, half, display.label),
+        make_number(spread, between),
+        make_number(slope, note),
+        write_remark(one, shared),
     )
 
 
@@ -273,43 +276,45 @@ def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder:
     """Changes of units, units beyond chance, logs that do not fit."""
     blocks: list[Block] = []
     changes = [
-        make_cells(
-            change.unit, get_parameter_label(one.parameter),
+        (
+            *(change.unit, make_parameter_cell(one.parameter)),
             "between " + format_span(change.field, change.before, change.after),
             _format_deviation(one, change.size, change.std),
         )
-        for one in found for change in one.changes
-    ]  # fmt: skip
+        for one in found
+        for change in one.changes
+    ]
     if changes:
-        head = make_cells("unit", "parameter", "where", "step ± 95 %")
-        blocks.append(TableBlock("Units that changed, as after a repair.", head, changes))
+        heads = ("unit", "parameter", "where", "step ± 95 %")
+        blocks.append(make_table("Units that changed, as after a repair.", heads, changes))
     units = [
-        make_cells(
-            format_unit(one, unit), get_parameter_label(one.parameter),
-            _format_deviation(one, unit.deviation, unit.std), f"{unit.score:.1f}",
+        (
+            *(format_unit(one, unit), make_parameter_cell(one.parameter)),
+            *(_format_deviation(one, unit.deviation, unit.std), unit.score),
         )
-        for one in found for unit in one.units if unit.odd
-    ]  # fmt: skip
+        for one in found
+        for unit in one.units
+        if unit.odd
+    ]
     if units:
-        head = make_cells(
-            "unit", "parameter", "deviation ± 95 %", "standard deviations of the units"
+        columns = (
+            *("unit", "parameter", "deviation ± 95 %"),
+            ("standard deviations of the units", ".1f"),
         )
         caption = "Units beyond what chance makes. They count in shared value and spread."
-        blocks.append(TableBlock(caption, head, units))
+        blocks.append(make_table(caption, columns, units))
     logs = [
         (
             Cell(Path(outlier.path).name, href=make_report_link(store, outlier.log, folder)),
-            *make_cells(
-                get_parameter_label(one.parameter), *_format_values(one, outlier), outlier.reason
-            ),
+            *(make_parameter_cell(one.parameter), *_format_values(one, outlier), outlier.reason),
         )
         for one in found
         for outlier in one.outliers
     ]
     if logs:
         caption = f"Logs that do not fit{make_truncation_caption(len(logs))}."
-        head = make_cells("log", "parameter", "value", "expected", "reason")
-        blocks.append(TableBlock(caption, head, logs[:MOST_ROWS]))
+        named = ("log", "parameter", "value", "expected", "reason")
+        blocks.append(make_table(caption, named, logs[:MOST_ROWS]))
     intro = (
         "Logs that do not fit are left out of the shared values above; a unit that changed counts "
         "as another one from there on."
@@ -352,8 +357,8 @@ def _build_failure_section(store: Store) -> Section:
     rows = [
         (
             Cell(Path(path).name, note=unit),
-            Cell(state, badge=True, tone=Tone.DOUBTFUL),
-            Cell(error),
+            make_badge(state, Tone.DOUBTFUL),
+            error,
             Cell(what, note=remedy),
         )
         for path, unit, state, error, what, remedy in every[:MOST_ROWS]
@@ -361,9 +366,8 @@ def _build_failure_section(store: Store) -> Section:
     blocks: list[Block] = []
     if rows:
         caption = f"Logs without a result{make_truncation_caption(len(every))}."
-        blocks.append(
-            TableBlock(caption, make_cells("log", "state", "reason", "what, and what to do"), rows)
-        )
+        columns = ("log", "state", "reason", "what, and what to do")
+        blocks.append(make_table(caption, columns, rows))
     return Section("failed", "Which logs failed, and why", "Nothing is left out silently.", blocks)
 
 

@@ -9,10 +9,25 @@ from drivetwin._util.display_units import spell_unit
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
 from drivetwin.calibration.front import Front
+from drivetwin.calibration.learn import Correction
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.findings import Finding
+from drivetwin.report.blocks import (
+    Block,
+    Column,
+    FigureBlock,
+    Section,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    Tone,
+    make_badge,
+    make_notes,
+    make_number,
+    make_table,
+)
 from drivetwin.report.figures.calibration import (
     build_profile_panels,
     get_metric_display,
@@ -20,19 +35,8 @@ from drivetwin.report.figures.calibration import (
     plot_profiles,
 )
 from drivetwin.report.html import render_page
-from drivetwin.report.sections.blocks import (
-    Block,
-    Cell,
-    FigureBlock,
-    NotesBlock,
-    Section,
-    TableBlock,
-    Tile,
-    TilesBlock,
-    Tone,
-    make_cells,
-)
 from drivetwin.report.sections.calibration_points import build_front_section, build_map_section
+from drivetwin.report.sections.findings import build_findings_section
 
 _TONES = {
     LimitState.CERTIFIED: Tone.GOOD,
@@ -69,22 +73,22 @@ def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Sec
         "from the request.",
         build_profile_panels(found),
     )
-    notes: list[Block] = [
-        NotesBlock("Outside the identified range", [one.text for one in findings], Tone.DOUBTFUL)
-    ]
+    outside = make_notes(
+        "Outside the identified range", [one.text for one in findings], Tone.DOUBTFUL
+    )
     return [
         Section(
             "result",
             "Result",
             "Statistics over fresh draws that were not optimised over.",
-            [_build_tiles(found), _build_limits(found), *(notes if findings else [])],
+            [_build_tiles(found), _build_limits(found), *outside],
         ),
         Section("profiles", "Profiles", "Before and after, over the spread band.", [profiles]),
         Section(
             "certificate",
             "Certificate",
             _describe_confidence(found),
-            [_build_statistics(found), _build_locks(found)],
+            [_build_statistics(found), _build_events(found)],
         ),
         Section(
             "distributions",
@@ -118,22 +122,52 @@ def _build_tiles(found: Calibration) -> TilesBlock:
     return TilesBlock(tiles)
 
 
+def build_calibration_blocks(
+    found: Calibration,
+    findings: Sequence[Finding],
+    front: Front | None = None,
+    mapped: OperatingMap | None = None,
+) -> list[Block]:
+    """Limits, statistics and events of a calibration, front and map, and findings."""
+    around = [build_front_section(front), build_map_section(mapped)]
+    tables = [one for section in around for one in section.blocks]
+    return [
+        *(_build_limits(found), _build_statistics(found), _build_events(found)),
+        *tables,
+        *build_findings_section(findings).blocks,
+    ]
+
+
+def build_correction_table(found: Correction) -> TableBlock:
+    """Deviations of logged shifts from the simulation before and after a correction of the twin."""
+    rows = []
+    for name, before in found.before.items():
+        unit = "N·m" if name.endswith("torque") else "rad/s"
+        rows.append((name, unit, before, found.after[name]))
+    return make_table(
+        "Logged shifts: RMS deviation of the simulation",
+        ("signal", "unit", ("before", ".3g"), ("after", ".3g")),
+        rows,
+    )
+
+
 def _build_limits(found: Calibration) -> TableBlock:
-    head = (*make_cells("metric", "for"), *make_cells("limit", "value", "upper", number=True),
-            *make_cells("state"))  # fmt: skip
     rows = [_build_limit_row(one) for one in found.after.certificate.limits]
-    return TableBlock("Limits; the upper bound holds with the stated confidence", head, rows)
+    return make_table(
+        "Limits; the upper bound holds with the stated confidence",
+        ("metric", "for", ("limit", "s"), ("value", ".4g"), ("upper", ".4g"), "state"),
+        rows,
+    )
 
 
-def _build_limit_row(one: LimitCheck) -> tuple[Cell, ...]:
+def _build_limit_row(one: LimitCheck) -> tuple[object, ...]:
     display = get_metric_display(one.limit.metric)
-    upper = "–" if one.upper is None else f"{one.upper * display.factor:.4g}"
     return (
-        *make_cells(METRICS[one.limit.metric].label, one.limit.statistic.value),
-        Cell(f"{one.limit.bound * display.factor:.4g} {display.label}", number=True),
-        Cell(f"{one.value * display.factor:.4g}", number=True),
-        Cell(upper, number=True),
-        Cell(one.text, badge=True, tone=_TONES[one.state]),
+        *(METRICS[one.limit.metric].label, one.limit.statistic.value),
+        f"{one.limit.bound * display.factor:.4g} {display.label}",
+        one.value * display.factor,
+        None if one.upper is None else one.upper * display.factor,
+        make_badge(one.text, _TONES[one.state]),
     )
 
 
@@ -148,8 +182,6 @@ def _describe_confidence(found: Calibration) -> str:
 
 
 def _build_statistics(found: Calibration) -> TableBlock:
-    names = ("median", "mean", "95 %", "upper", "99 %", "upper", "worst")
-    head = (*make_cells("metric", ""), *make_cells(*names, number=True))
     rows = []
     for metric, spec in METRICS.items():
         display = get_metric_display(metric)
@@ -159,41 +191,44 @@ def _build_statistics(found: Calibration) -> TableBlock:
                 *(q.median, q.mean, q.share_95, q.upper_95),
                 *(q.share_99, q.upper_99, q.worst),
             )
-            texts = ("–" if v is None else f"{v * display.factor:.4g}" for v in values)
+            scaled = (None if v is None else f"{v * display.factor:.4g}" for v in values)
             label = f"{spec.label} [{display.label}]" if part == "before" else ""
-            rows.append((*make_cells(label, part), *make_cells(*texts, number=True)))
-    return TableBlock("Metrics over the fresh draws", head, rows)
+            rows.append((label, part, *scaled))
+    columns: Sequence[Column] = (
+        *("metric", ""),
+        *(make_number(name, secondary=True) for name in ("median", "mean")),
+        *(("95 %", "s"), ("upper", "s"), ("99 %", "s")),
+        make_number("upper", secondary=True),
+        ("worst", "s"),
+    )
+    return make_table("Metrics over the fresh draws", columns, rows)
 
 
-def _build_locks(found: Calibration) -> TableBlock:
-    head = (*make_cells("event", ""), *make_cells("draws", "upper bound of share", number=True))
+def _build_events(found: Calibration) -> TableBlock:
     rows = []
     for part, one in (("before", found.before.certificate), ("after", found.after.certificate)):
         for label, count, bound in (
             ("no lock-up", one.unlocked, one.unlocked_upper),
             ("slips again after lock-up", one.relocked, one.relocked_upper),
         ):
-            numbers = make_cells(str(count), f"{100.0 * bound:.2f} %", number=True)
-            rows.append((*make_cells(label, part), *numbers))
-    return TableBlock("Events of the on-coming element", head, rows)
+            rows.append((label, part, count, f"{100.0 * bound:.2f} %"))
+    columns = ("event", "", ("draws", "d"), ("upper bound of share", "s"))
+    return make_table("Events of the on-coming element", columns, rows)
 
 
 def _build_values(found: Calibration) -> TableBlock:
-    head = (*make_cells("parameter", "unit"), *make_cells("before", "after", "low", "high",
-            number=True), *make_cells("meaning"))  # fmt: skip
+    before, after = found.before.values.tolist(), found.after.values.tolist()
     rows = []
-    parameters = found.task.policy.parameters
-    for one, old, new in zip(parameters, found.before.values, found.after.values, strict=True):
-        numbers = (f"{value:.5g}" for value in (old, new, one.low, one.high))
-        unit = spell_unit(one.unit)
-        rows.append((*make_cells(one.name, unit), *make_cells(*numbers, number=True),
-                     *make_cells(one.text if one.free else f"{one.text} (kept)")))  # fmt: skip
-    return TableBlock("Parameters of the policy, SI", head, rows)
+    for one, old, new in zip(found.task.policy.parameters, before, after, strict=True):
+        text = one.text if one.free else f"{one.text} (kept)"
+        rows.append((one.name, spell_unit(one.unit), old, new, one.low, one.high, text))
+    numbers = ((name, ".5g") for name in ("before", "after", "low", "high"))
+    columns: Sequence[Column] = ("parameter", "unit", *numbers, "meaning")
+    return make_table("Parameters of the policy, SI", columns, rows)
 
 
 def _build_definitions() -> TableBlock:
     rows = [
-        make_cells(one.label, spell_unit(one.unit), one.definition, one.source)
-        for one in METRICS.values()
+        (one.label, spell_unit(one.unit), one.definition, one.source) for one in METRICS.values()
     ]
-    return TableBlock("Metrics", make_cells("metric", "unit", "definition", "source"), rows)
+    return make_table("Metrics", ("metric", "unit", "definition", "source"), rows)

@@ -9,6 +9,7 @@ import numpy as np
 
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.drive.result import TRACE_STEP, DriveRun
+from drivetwin.report.blocks import FigureBlock, Section, TableBlock, make_table
 from drivetwin.report.figures.drive import (
     build_maneuver_panels,
     build_motion_panels,
@@ -17,7 +18,6 @@ from drivetwin.report.figures.drive import (
     plot_motion,
 )
 from drivetwin.report.html import render_page
-from drivetwin.report.sections.blocks import Cell, FigureBlock, Section, TableBlock, make_cells
 
 
 def render_drive(run: DriveRun, title: str) -> str:
@@ -40,33 +40,61 @@ def render_drive(run: DriveRun, title: str) -> str:
             "work",
             "Friction",
             "Friction work and power of the shift elements.",
-            [_build_shift_table(run)],
+            [build_shift_table(run)],
         ),
         Section("shifts", "Shifts", "Each shift in the order of the drive.", shifts),
         Section(
             "energy",
             "Energy",
             "Energy balance of the engine work.",
-            [FigureBlock(plot_energy(run), "Energy by part, kJ.")],
+            [FigureBlock(plot_energy(run), "Energy by part, kJ."), build_energy_table(run)],
         ),
     ]
     return render_page(title, f"{run.time[-1]:.1f} s from standstill", sections)
 
 
-def _build_shift_table(run: DriveRun) -> TableBlock:
-    names = ("shift", "kind", "element", "begin [s]", "work [kJ]", "peak power [kW]")
-    rows = [
-        (
-            *make_cells(each.action.label, each.action.kind, work.element),
-            Cell(f"{each.action.start:.2f}", number=True),
-            Cell(f"{abs(work.work) / 1e3:.2f}", number=True),
-            Cell(f"{work.peak_power / 1e3:.1f}", number=True),
+def build_shift_table(run: DriveRun) -> TableBlock:
+    """One row a shift; work and peak power of the off-going, then of the on-coming element."""
+    rows = []
+    for each in run.maneuvers:
+        low, high = each.shaft_torque
+        slip = ""
+        if each.break_away is not None and each.lock is not None:
+            slip = f"{each.lock - each.break_away:.2f}"
+        rows.append(
+            (
+                *(each.action.label, each.action.kind),
+                " ".join(work.element for work in each.work),
+                each.action.start,
+                slip,
+                " ".join(f"{abs(work.work) / 1e3:.1f}" for work in each.work),
+                " ".join(f"{work.peak_power / 1e3:.0f}" for work in each.work),
+                f"{low:z.0f}..{high:z.0f}",
+            )
         )
-        for each in run.maneuvers
-        for work in each.work
-    ]
-    head = (*make_cells(*names[:3]), *make_cells(*names[3:], number=True))
-    return TableBlock("Friction work and peak power of the elements", head, rows)
+    columns = (
+        *("shift", "kind", "off on", ("at s", "z.1f"), ("slip s", "s")),
+        *(("work [kJ]", "s"), ("peak power [kW]", "s"), ("shaft [Nm]", "s")),
+    )
+    caption = "Friction work and peak power of the elements, torque of the output shaft"
+    return make_table(caption, columns, rows)
+
+
+def build_energy_table(run: DriveRun) -> TableBlock:
+    """The energy balance, with the friction of shift elements apart from brake and rolling."""
+    audit, elements = run.audit, sum(run.work.values())
+    parts = {
+        "engine": audit.source,
+        "gain of kinetic and elastic energy": audit.stored,
+        "torque converter": audit.converter,
+        "clutches and brakes of the transmission": elements,
+        "service brake and rolling resistance": audit.friction - elements,
+        "air and grade": audit.load,
+        "damping of the output shaft": audit.shaft,
+        "unexplained": audit.error,
+    }
+    rows = [(part, value / 1e3) for part, value in parts.items()]
+    return make_table("Energy over the drive", ("part", ("kJ", "z.3f")), rows)
 
 
 def format_traces(run: DriveRun) -> str:

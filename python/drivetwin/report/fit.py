@@ -13,29 +13,26 @@ from drivetwin._util.display_units import (
     get_display_unit,
 )
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.fit import HeldOut
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.term import NetworkTerm
-from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
-from drivetwin.report.html import render_page
-from drivetwin.report.sections.blocks import (
+from drivetwin.report.blocks import (
     Block,
     Cell,
     FigureBlock,
     Section,
     TableBlock,
     VerdictBlock,
-    make_cells,
+    make_table,
 )
-from drivetwin.report.sections.parameters import (
-    STATUS_TONES,
-    build_findings_section,
-    build_parameter_blocks,
-)
+from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
+from drivetwin.report.html import render_page
+from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
+from drivetwin.report.sections.findings import build_findings_section
+from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import MEASURED, MUTED, SIMULATED
 from drivetwin.simulation.network import NetworkRun
 
@@ -58,8 +55,6 @@ def render_fit(
     """HTML text of the page; equal fits give equal text."""
     parts = zip(logs, found.problem.parts, found.simulate(), strict=True)
     figures = [_build_figure(log, part, run) for log, part, run in parts]
-    agreement = dict(zip(logs, found.agreement, strict=True))
-    agreement |= {f"{name}, held out": one.agreement for name, one in held_out.items()}
     sections = [
         Section("result", "Result", "", [_build_verdict(found), *_build_parameters(found)]),
         build_findings_section((*remarks, *found.findings)),
@@ -67,7 +62,7 @@ def render_fit(
             "recordings",
             "Recordings",
             "Measured and simulated quantities, driven by the measured inputs.",
-            [*figures, _build_agreement_table(agreement)],
+            [*figures, _build_agreement_table(found, logs, held_out)],
         ),
         Section(
             "search",
@@ -81,11 +76,26 @@ def render_fit(
     return render_page(f"{found.model.name}: fit of {', '.join(logs)}", subtitle, shown)
 
 
+def build_fit_blocks(
+    found: ModelFit,
+    logs: Sequence[str],
+    held_out: Mapping[str, HeldOut],
+    remarks: Sequence[Finding] = (),
+) -> list[Block]:
+    """Verdict, parameters, agreement with the recordings, minima of the search, and findings."""
+    return [
+        _build_verdict(found),
+        *_build_parameters(found),
+        _build_agreement_table(found, logs, held_out),
+        _build_start_table(found),
+        *build_findings_section((*remarks, *found.findings)).blocks,
+    ]
+
+
 def _build_verdict(found: ModelFit) -> VerdictBlock:
     size = format_significant(found.chi2, 3)
     reason = f"The residuals are {size} times the noise, in squares per sample."
-    action = _ACTIONS[found.status]
-    return VerdictBlock(found.status.value, reason, action, STATUS_TONES[found.status])
+    return build_verdict_block(ModelVerdict(found.status, reason, _ACTIONS[found.status]))
 
 
 def _build_parameters(found: ModelFit) -> list[Block]:
@@ -116,31 +126,33 @@ def _get_display(quantity: Quantity) -> Display:
     return RPM if quantity is Quantity.SPEED else get_display_unit(quantity.unit)
 
 
-def _build_agreement_table(agreement: Mapping[str, Mapping[str, SignalFit]]) -> TableBlock:
-    head = (*make_cells("log", "output"), *make_cells("fit %", "rmse, SI", number=True))
+def _build_agreement_table(
+    found: ModelFit, logs: Sequence[str], held_out: Mapping[str, HeldOut]
+) -> TableBlock:
+    agreement = dict(zip(logs, found.agreement, strict=True))
+    agreement |= {f"{name}, held out": one.agreement for name, one in held_out.items()}
     rows = [
-        (
-            *make_cells(log, name),
-            Cell(f"{one.fit_percent:.1f}", number=True),
-            Cell(format_significant(one.rmse, 3), number=True),
-        )
+        (log, name, one.fit_percent, one.rmse)
         for log, fits in agreement.items()
         for name, one in fits.items()
     ]
-    return TableBlock("Agreement of simulation and measurement", head, rows)
+    columns = ("log", "output", ("fit %", ".1f"), ("rmse, SI", "3"))
+    return make_table("Agreement of simulation and measurement", columns, rows)
 
 
 def _build_start_table(found: ModelFit) -> TableBlock:
     best = min(one.cost for one in found.starts)
-    values = "first value" if len(found.sought) == 1 else "first values"
-    head = (Cell("start"), *make_cells("Q above the best", "iterations", number=True), Cell(values))
     rows = []
     for number, start in enumerate(found.starts, start=1):
         texts = [
             f"{one.name} {format_uncertainty(one.to_value(start.point[one.name]), None)[0]}"
             for one in found.sought[:4]
         ]
-        cells = (Cell(f"{start.cost - best:.2f}", number=True), Cell(f"{start.iterations}", True))
-        rows.append((Cell(str(number)), *cells, Cell(", ".join(texts), secondary=True)))
-    caption = f"{found.agreeing} of {len(found.starts)} starts led to the best minimum"
-    return TableBlock(caption, head, rows)
+        rows.append((str(number), start.cost - best, start.iterations, ", ".join(texts)))
+    values = "first value" if len(found.sought) == 1 else "first values"
+    columns = ("start", ("Q above the best", ".2f"), ("iterations", "d"))
+    return make_table(
+        f"{found.agreeing} of {len(found.starts)} starts led to the best minimum",
+        (*columns, Cell(values, secondary=True)),
+        rows,
+    )

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
@@ -18,12 +19,13 @@ from drivetwin._util.timed_stages import TimedStages
 from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
+from drivetwin.report.blocks import Block, FigureBlock, Section
 from drivetwin.report.embedded_data import Store, encode_content
 from drivetwin.report.figure import Entry, encode_entries
 from drivetwin.report.sections.actuators import build_actuator_section
-from drivetwin.report.sections.blocks import FigureBlock, Section
+from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.identifiability import build_limits_section
-from drivetwin.report.sections.parameters import build_findings_section, build_result_section
+from drivetwin.report.sections.parameters import build_result_section
 from drivetwin.report.sections.provenance import build_provenance_section
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.report.sections.summary import (
@@ -93,14 +95,6 @@ def render_page(
     The samples of figures over time stand once, packed, at the end of the page. So does plotly.js,
     unless `library` names a file of `save_library` beside the page, which many pages can share.
     """
-    environment = Environment(
-        loader=PackageLoader("drivetwin.report"),
-        autoescape=True,
-        finalize=_show,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     store = Store()
     figures = sum(isinstance(block, FigureBlock) for one in sections for block in one.blocks)
     drawn = count(1)
@@ -109,19 +103,43 @@ def render_page(
         notify_progress(next(drawn) / (figures + 1))
         return encode_figure(block, store)
 
-    environment.filters["figure_json"] = as_json
     with PAGE.enter("figures"):
-        return environment.get_template("report.html.j2").render(
-            title=title,
-            subtitle=subtitle,
-            sections=sections,
-            style=read_template("status.css") + read_template("report.css"),
-            script=read_template("report.js"),
-            samples_index=lambda: _encode_json(store.index),
-            samples=lambda: Markup(store.encode()),
-            library=library,
-            plotly_js=Markup("" if library else _load_encoded_library()),
+        return (
+            _make_environment(as_json)
+            .get_template("report.html.j2")
+            .render(
+                title=title,
+                subtitle=subtitle,
+                sections=sections,
+                style=read_template("status.css") + read_template("report.css"),
+                script=read_template("report.js"),
+                samples_index=lambda: _encode_json(store.index),
+                samples=lambda: Markup(store.encode()),
+                library=library,
+                plotly_js=Markup("" if library else _load_encoded_library()),
+            )
         )
+
+
+def render_fragment(blocks: Sequence[Block]) -> str:
+    """Return blocks as HTML without figures and style, for a page of others."""
+    shown = [one for one in blocks if not isinstance(one, FigureBlock)]
+    template = _make_environment(str).get_template("blocks.html.j2")
+    return str(template.make_module().render_blocks(shown))  # type: ignore[attr-defined]
+
+
+def _make_environment(encode: Callable[[FigureBlock], str]) -> Environment:
+    """Make the environment of the templates, in which `encode` converts a figure to JSON."""
+    environment = Environment(
+        loader=PackageLoader("drivetwin.report"),
+        autoescape=True,
+        finalize=_show,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["figure_json"] = encode
+    return environment
 
 
 def save_library(path: Path) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from drivetwin._util.display_units import Display, get_display_unit
 from drivetwin.channels.pressure_roles import get_command_element, get_pressure_element
 from drivetwin.channels.roles import get_quantity
 from drivetwin.estimation.result.estimate import Estimate
@@ -55,6 +56,6 @@ def get_channel_symbol(role: str) -> str:
     return _SYMBOLS.get(role, role) if element is None else f"P {element}"
 
 
-def get_channel_unit(role: str) -> str:
-    """SI unit of a channel by its role. Raises KeyError for a role that does not exist."""
-    return get_quantity(role).unit
+def get_channel_display(role: str) -> Display:
+    """Display unit of a channel by its role. Raises KeyError for a role that does not exist."""
+    return get_display_unit(get_quantity(role).unit)

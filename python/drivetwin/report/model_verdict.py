@@ -13,8 +13,16 @@ from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.verdict import get_experiment
 from drivetwin.files.result_file import ResultFile
 from drivetwin.findings import Code, Finding, Severity, explain, report
+from drivetwin.report.blocks import Tone, VerdictBlock
 from drivetwin.report.labels import get_channel_label, get_parameter_name
 
+STATUS_TONES = {
+    ModelStatus.VALID: Tone.GOOD,
+    ModelStatus.LIMITED: Tone.DOUBTFUL,
+    ModelStatus.NOT_VALID: Tone.BAD,
+    ModelStatus.NOT_VALIDATED: Tone.DOUBTFUL,
+}
+"""Colours of the statuses."""
 _SHOWN = 2
 """Number of experiments, or of suspected entries of the card, that an action names."""
 
@@ -44,6 +52,12 @@ class ModelVerdict:
     def text(self) -> str:
         """Reason and action."""
         return f"{self.reason} {self.action}"
+
+
+def build_verdict_block(verdict: ModelVerdict) -> VerdictBlock:
+    """Build the verdict on a model: status in its colour, reason and next action."""
+    tone = STATUS_TONES[verdict.status]
+    return VerdictBlock(verdict.status.value, verdict.reason, verdict.action, tone)
 
 
 def explain_identification(found: Identification) -> ModelVerdict:

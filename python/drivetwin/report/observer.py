@@ -8,10 +8,10 @@ from pathlib import Path
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.observer.result import Observation
+from drivetwin.report.blocks import Block, FigureBlock, Section, make_notes, make_table
 from drivetwin.report.figures.observer import build_observer_panels
 from drivetwin.report.figures.stack import stack_panels
 from drivetwin.report.html import render_page
-from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, Section
 from drivetwin.validation.simulate_log import clip_phases
 
 
@@ -26,10 +26,21 @@ def _build_section(number: int, one: Observation, log: ShiftLog) -> Section:
     panels = build_observer_panels(one, log)
     phases = clip_phases(one.shift, (float(one.time[0]), float(one.time[-1])))
     figure = stack_panels(panels, phases, height=280 * len(panels))
-    blocks: list[FigureBlock | NotesBlock] = [
-        FigureBlock(figure, "Each torque with its 95 % band.", panels)
-    ]
-    if one.notes:
-        blocks.append(NotesBlock("Missing in the log", one.notes))
+    drawn = FigureBlock(figure, "Each torque with its 95 % band.", panels)
     name = f"Shift {one.shift.start_gear}→{one.shift.end_gear}"
+    blocks = [drawn, *build_torque_blocks(one)]
     return Section(f"shift{number}", name, f"A {one.shift.kind}.", blocks)
+
+
+def build_torque_blocks(one: Observation) -> list[Block]:
+    """Table of the torques with the half width of their bands, and what the log lacks."""
+    rows = []
+    for name, band in one.bands.items():
+        half = band.upper - band.value
+        rows.append((name, band.value.min(), band.value.max(), half.mean(), half.max()))
+    columns = (
+        *("torque", ("lowest [Nm]", "z.0f"), ("highest [Nm]", "z.0f")),
+        *(("± 95 % [Nm]", "z.1f", "mean"), ("± 95 % [Nm]", "z.1f", "largest")),
+    )
+    caption = f"Shift {one.shift.start_gear}→{one.shift.end_gear} by {one.observer}"
+    return [make_table(caption, columns, rows), *make_notes("Missing in the log", one.notes)]

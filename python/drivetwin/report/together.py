@@ -11,11 +11,12 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.multi_log.fit import extract_log
 from drivetwin.estimation.result.multi_log import Several
+from drivetwin.report.blocks import Section
 from drivetwin.report.html import PAGE, build_report_sections, render_page
-from drivetwin.report.sections.blocks import Section
+from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.likelihood import build_likelihood_sections
-from drivetwin.report.sections.parameters import build_findings_section, build_result_section
+from drivetwin.report.sections.parameters import build_result_section
 from drivetwin.report.sections.provenance import build_provenance_section
 from drivetwin.report.sections.summary import (
     build_friction_section,

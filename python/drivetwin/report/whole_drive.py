@@ -6,15 +6,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from drivetwin._util.display_units import format_significant, get_display_unit
+from drivetwin.report.blocks import Column, FigureBlock, Section, TableBlock, make_table
 from drivetwin.report.figures.shift_summary import plot_quality
 from drivetwin.report.html import render_page
-from drivetwin.report.sections.blocks import Cell, FigureBlock, Section, TableBlock, make_cells
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.summary import SUMMARIZED, ShiftGroup, summarize_shifts
 
-_TEXTS = ("kind", "gears")
-_NUMBERS = ("shifts", "mean", "spread", "worst", "at s")
+_BESIDE = 3
+"""So many shifts beside each other in a table."""
 
 
 def render_whole_drive(shifts: Sequence[Shift], log: str) -> str:
@@ -35,37 +35,53 @@ def render_whole_drive(shifts: Sequence[Shift], log: str) -> str:
 
 
 def _build_sections(shifts: Sequence[Shift], groups: Sequence[ShiftGroup]) -> Iterator[Section]:
+    for name, table in build_summary_tables(groups).items():
+        label = _get_label(name)
+        figure = FigureBlock(plot_quality(name, shifts), f"{label} of each shift.")
+        text = "The spread is the standard deviation between the shifts, the worst is the largest."
+        yield Section(name, label, text, [figure, table])
+
+
+def _get_label(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def build_summary_tables(groups: Sequence[ShiftGroup]) -> dict[str, TableBlock]:
+    """Build one table for each figure of shift quality, by name: statistics by kind and gears."""
+    columns = (
+        *("kind", "gears"),
+        *(("shifts", "d"), ("mean", "3"), ("spread", "s"), ("worst", "3"), ("at s", "z.2f")),
+    )
+    tables = {}
     for name in SUMMARIZED:
-        if not any(name in one.figures for one in groups):
-            continue
-        label = name.replace("_", " ").capitalize()
-        yield Section(
-            name,
-            label,
-            "The spread is the standard deviation between the shifts, the worst is the largest.",
-            [
-                FigureBlock(plot_quality(name, shifts), f"{label} of each shift."),
-                _build_table(name, groups),
-            ],
-        )
+        display = get_display_unit(QUALITY_UNITS[name])
+        rows = []
+        for group in groups:
+            if (one := group.figures.get(name)) is None:
+                continue
+            spread = (
+                "" if one.spread is None else format_significant(display.factor * one.spread, 3)
+            )
+            mean, worst = display.factor * one.mean, display.factor * one.worst
+            numbers = (one.count, mean, spread, worst, one.worst_time)
+            rows.append((group.kind.value, group.gears or "all", *numbers))
+        if rows:
+            caption = f"{_get_label(name)} by kind of shift, in {display.label}"
+            tables[name] = make_table(caption, columns, rows)
+    return tables
 
 
-def _build_table(name: str, groups: Sequence[ShiftGroup]) -> TableBlock:
-    display = get_display_unit(QUALITY_UNITS[name])
-
-    def format_value(value: float | None) -> Cell:
-        text = "" if value is None else format_significant(display.factor * value, 3)
-        return Cell(text, number=True)
-
-    rows = [
-        (
-            *make_cells(group.kind.value, group.gears or "all"),
-            Cell(str(one.count), number=True),
-            *(format_value(value) for value in (one.mean, one.spread, one.worst)),
-            Cell(f"{one.worst_time:z.2f}", number=True),
-        )
-        for group in groups
-        if (one := group.figures.get(name)) is not None
-    ]
-    head = (*make_cells(*_TEXTS), *make_cells(*_NUMBERS, number=True))
-    return TableBlock(f"By kind of shift, in {display.label}", head, rows)
+def build_quality_tables(shifts: Sequence[Shift]) -> Iterator[TableBlock]:
+    """Build tables of shift quality, one column for each shift; split if there are many."""
+    for first in range(0, len(shifts), _BESIDE):
+        part = shifts[first : first + _BESIDE]
+        names = [f"{one.start_gear}→{one.end_gear}, {one.lockup_time:z.2f} s" for one in part]
+        rows = []
+        for figure, unit in QUALITY_UNITS.items():
+            if any(figure in one.quality for one in part):
+                display = get_display_unit(unit)
+                values = (one.quality.get(figure) for one in part)
+                scaled = (None if one is None else one * display.factor for one in values)
+                rows.append((figure.replace("_", " "), *scaled, display.label))
+        columns: Sequence[Column] = ("figure", *((name, "3") for name in names), "unit")
+        yield make_table("Shift quality", columns, rows)

@@ -10,8 +10,8 @@ from enum import StrEnum
 from drivetwin.channels.roles import NEEDED
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import DEFAULT_METHOD
-from drivetwin.report.sections.blocks import Tone
-from drivetwin.report.sections.parameters import STATUS_TONES
+from drivetwin.report.blocks import Tone
+from drivetwin.report.model_verdict import STATUS_TONES
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session_state import SessionState

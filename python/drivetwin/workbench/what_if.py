@@ -12,11 +12,11 @@ from drivetwin._util.display_units import Display, get_display_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.blocks import make_link
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
 from drivetwin.report.labels import get_parameter_name
-from drivetwin.report.sections.blocks import make_link
 from drivetwin.report.style import COMPARED
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import (

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.linear.ringdown import RingDown
+from drivetwin.report.blocks import FigureBlock
 from drivetwin.report.embedded_data import Store
 from drivetwin.report.figures.ringdown import build_ringdown_panels, plot_ringdown
 from drivetwin.report.html import encode_figure
-from drivetwin.report.sections.blocks import FigureBlock
 
 
 def _ring() -> RingDown:

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from drivetwin.report.blocks import TableBlock
 from drivetwin.report.sections.actuators import build_actuator_section
-from drivetwin.report.sections.blocks import TableBlock
 from tests.files.test_twin_file import ACTUATOR
 from tests.report.sample import identification
 

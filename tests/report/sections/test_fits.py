@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from drivetwin._util.display_units import RPM, format_significant
 from drivetwin.estimation.result.estimate import SignalFit
-from drivetwin.report.sections.blocks import Tone
+from drivetwin.report.blocks import Tone
 from drivetwin.report.sections.fits import build_fit_table, find_missed_phase
 from drivetwin.validation.simulate_log import attach_fit
 from tests.report.sample import identification, validation

@@ -16,7 +16,7 @@ from drivetwin.estimation.result.suggestion import (
     Experiment,
     ExperimentRanking,
 )
-from drivetwin.report.sections.blocks import NotesBlock, TableBlock
+from drivetwin.report.blocks import NotesBlock, TableBlock
 from drivetwin.report.sections.identifiability import build_limits_section
 from tests.report.sample import identification
 
@@ -80,5 +80,11 @@ def test_simulated_experiments_take_the_place_of_the_general_advice() -> None:
             "–",
             "–",
         ],
-        ["η", "identified", "± 0.020", limit, "–", "P0 (B3)", "± 0.010"],
+        ["η", "identified", "± 0.020", "–", "–", "P0 (B3)", "± 0.010"],
     ]
+    (notes,) = [
+        one
+        for one in build_limits_section(found).blocks
+        if isinstance(one, NotesBlock) and one.heading == "Not narrowed by an experiment"
+    ]
+    assert notes.items == [f"η: {limit}"]

@@ -11,8 +11,8 @@ from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.correction import keep_fit
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
+from drivetwin.report.blocks import FigureBlock, TableBlock, Tone
 from drivetwin.report.html import render_report
-from drivetwin.report.sections.blocks import FigureBlock, TableBlock, Tone
 from drivetwin.report.sections.likelihood import (
     build_likelihood_sections,
     count_consistent_residuals,

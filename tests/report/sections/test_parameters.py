@@ -9,10 +9,10 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import SignalFit, Verdict
 from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.findings import Code, report
+from drivetwin.report.blocks import Cell, FigureBlock, NotesBlock, Tone, VerdictBlock
 from drivetwin.report.figures.parameters import plot_intervals
-from drivetwin.report.sections.blocks import Cell, FigureBlock, NotesBlock, Tone, VerdictBlock
+from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.parameters import (
-    build_findings_section,
     build_parameter_table,
     build_result_section,
 )

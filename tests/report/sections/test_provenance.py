@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.report.sections.blocks import NotesBlock, TableBlock
+from drivetwin.report.blocks import NotesBlock, TableBlock
 from drivetwin.report.sections.provenance import build_provenance_section
 from tests.report.sample import identification
 

@@ -14,8 +14,8 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
+from drivetwin.report.blocks import FigureBlock, NotesBlock, Section, TableBlock, Tone
 from drivetwin.report.html import render_report
-from drivetwin.report.sections.blocks import FigureBlock, NotesBlock, Section, TableBlock, Tone
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin

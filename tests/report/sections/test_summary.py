@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.report.sections.blocks import FigureBlock
+from drivetwin.report.blocks import FigureBlock
 from drivetwin.report.sections.summary import build_friction_section, describe_phases
 from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.report.sample import identification
@@ -22,7 +22,7 @@ def test_friction_without_an_output_torque_is_told_as_what_it_is() -> None:
     assert "no output torque" in without.intro
     assert "output torque (eq. 16" not in without.intro
     for section, law in ((with_torque, "Stribeck law μ = "), (without, "Stribeck law μ/η = ")):
-        (block,) = section.blocks
+        block, _ = section.blocks
         assert isinstance(block, FigureBlock)
         assert law in block.caption
 

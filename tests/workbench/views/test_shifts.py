@@ -22,5 +22,7 @@ def test_shift_quality_is_told_in_units_of_engineers(identified: Session, tmp_pa
     sessions.close()
     figures = identified.work.shifts[0].quality
     text = str(quality)
-    assert f"'{format_significant(1e3 * figures['shift_time'], 3)} ms'" in text
-    assert f"'{format_significant(1e-3 * figures['friction_work'], 3)} kJ'" in text
+    assert f"['{format_significant(1e3 * figures['shift_time'], 3)}']" in text
+    assert f"['{format_significant(1e-3 * figures['friction_work'], 3)}']" in text
+    assert "['ms']" in text
+    assert "['kJ']" in text

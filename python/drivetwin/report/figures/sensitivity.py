@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin._util.display_units import format_significant, get_display_unit
+from drivetwin._util.display_units import format_significant
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     AGE,
     FRICTION,
@@ -15,7 +15,7 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
 from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.figure import Figure, make_subplots, make_trace
-from drivetwin.report.labels import get_channel_symbol, get_channel_unit, get_parameter_label
+from drivetwin.report.labels import get_channel_display, get_channel_symbol, get_parameter_label
 from drivetwin.report.style import DIVERGING, make_axis, make_layout
 
 _KINDS = {
@@ -108,7 +108,7 @@ def _describe_sensor(found: Sensitivity, k: int) -> str:
     role, kind = found.errors[k].rsplit(" ", 1)
     if kind != "offset":
         return get_channel_symbol(role)
-    display = get_display_unit(get_channel_unit(role))
+    display = get_channel_display(role)
     size = format_significant(found.sizes[k] * display.factor, 2)
     return f"{get_channel_symbol(role)}<br>{size}<br>{display.label}"
 

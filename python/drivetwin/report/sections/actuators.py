@@ -10,7 +10,7 @@ from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorQuantity
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.report.sections.blocks import Cell, Section, TableBlock, Tone
+from drivetwin.report.blocks import Cell, Section, TableBlock, Tone, make_table
 
 
 def build_actuator_section(found: Identification) -> Section:
@@ -38,12 +38,12 @@ def _build_table(name: str, one: IdentifiedActuator) -> TableBlock:
     else:
         rms = format_with_unit(one.rms, "Pa", digits=3)
         caption = f"Actuator of {name}: {one.samples} samples, residual {rms} rms"
-    return TableBlock(caption, (Cell("parameter"), Cell("value, 95 %", number=True)), rows)
+    return make_table(caption, ("parameter", ("value, 95 %", "s")), rows)
 
 
-def _build_row(spec: ActuatorQuantity, value: float, std: float) -> tuple[Cell, Cell]:
+def _build_row(spec: ActuatorQuantity, value: float, std: float) -> tuple[object, ...]:
     label = Cell(f"{spec.label} {spec.symbol}", note=spec.meaning)
     if isinf(std):
         text = format_with_unit(value, spec.unit, digits=3)
         return label, Cell(text, number=True, note="assumed, not determined", tone=Tone.UNKNOWN)
-    return label, Cell(format_with_unit(value, spec.unit, Z95 * std), number=True)
+    return label, format_with_unit(value, spec.unit, Z95 * std)

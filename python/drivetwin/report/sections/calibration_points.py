@@ -3,24 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from drivetwin._util.display_units import RPM
 from drivetwin.calibration.certificate import LimitState
 from drivetwin.calibration.front import Front
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import MapPoint, OperatingMap
+from drivetwin.report.blocks import Block, Cell, FigureBlock, Section, TableBlock, Tone, make_table
 from drivetwin.report.figure import Figure, make_trace
-from drivetwin.report.sections.blocks import (
-    Block,
-    Cell,
-    FigureBlock,
-    Section,
-    TableBlock,
-    Tone,
-    make_cells,
-)
 from drivetwin.report.style import SIMULATED, make_axis, make_layout
-
-_RPM = 9.549297
-"""1 rad/s in rpm."""
 
 
 def build_front_section(front: Front | None) -> Section:
@@ -58,13 +50,12 @@ def plot_front(front: Front) -> Figure:
 
 
 def _build_front_table(front: Front) -> TableBlock:
-    head = (*make_cells("moved limit"), *make_cells("shift time, 95 % [s]",
-            "peak jerk, 95 % [m/s³]", "mean friction energy [kJ]", number=True))  # fmt: skip
-    rows = []
-    for one in front.points:
-        texts = f"{one.time:.3f}", f"{one.jerk:.1f}", f"{1e-3 * one.energy:.1f}"
-        rows.append((Cell(one.arm.value), *make_cells(*texts, number=True)))
-    return TableBlock(f"{len(front.points)} of {front.tried} calibrations", head, rows)
+    rows = [(one.arm.value, one.time, one.jerk, 1e-3 * one.energy) for one in front.points]
+    columns = (
+        *("moved limit", ("shift time, 95 % [s]", ".3f"), ("peak jerk, 95 % [m/s³]", ".1f")),
+        ("mean friction energy [kJ]", ".1f"),
+    )
+    return make_table(f"{len(front.points)} of {front.tried} calibrations", columns, rows)
 
 
 def build_map_section(mapped: OperatingMap | None) -> Section:
@@ -85,24 +76,22 @@ def build_map_section(mapped: OperatingMap | None) -> Section:
     )
 
 
-def _build_map_table(caption: str, points: tuple[MapPoint, ...] | list[MapPoint]) -> TableBlock:
-    numbers = ("engine torque [Nm]", "engine speed [rpm]", "peak jerk, 95 % [m/s³]",
-               "shift time, 95 % [s]", "mean friction energy [kJ]")  # fmt: skip
-    head = (*make_cells(*numbers, number=True), Cell("limits"))
-    return TableBlock(caption, head, [_build_map_row(one) for one in points])
-
-
-def _build_map_row(one: MapPoint) -> tuple[Cell, ...]:
-    point, certificate = one.task.maneuver.point, one.found.certificate
-    energy = certificate.quantiles[Metric.FRICTION_ENERGY].mean
-    texts = (
-        f"{point.engine_torque:.0f}",
-        f"{point.engine_speed * _RPM:.0f}",
-        f"{one.jerk:.1f}",
-        f"{certificate.quantiles[Metric.SHIFT_TIME].share_95:.3f}",
-        f"{1e-3 * energy:.1f}",
+def _build_map_table(caption: str, points: Sequence[MapPoint]) -> TableBlock:
+    columns = (
+        *(("engine torque [Nm]", ".0f"), ("engine speed [rpm]", ".0f")),
+        *(("peak jerk, 95 % [m/s³]", ".1f"), ("shift time, 95 % [s]", ".3f")),
+        *(("mean friction energy [kJ]", ".1f"), "limits"),
     )
+    return make_table(caption, columns, [_build_map_row(one) for one in points])
+
+
+def _build_map_row(one: MapPoint) -> tuple[object, ...]:
+    point, certificate = one.task.maneuver.point, one.found.certificate
     exceeded = [each for each in certificate.limits if each.state is LimitState.EXCEEDED]
     named = ", ".join(METRICS[each.limit.metric].label for each in exceeded)
-    state = Cell(f"exceeds {named}", tone=Tone.DOUBTFUL) if exceeded else Cell("kept")
-    return (*make_cells(*texts, number=True), state)
+    return (
+        *(point.engine_torque, point.engine_speed * RPM.factor, one.jerk),
+        certificate.quantiles[Metric.SHIFT_TIME].share_95,
+        1e-3 * certificate.quantiles[Metric.FRICTION_ENERGY].mean,
+        Cell(f"exceeds {named}", tone=Tone.DOUBTFUL) if exceeded else "kept",
+    )

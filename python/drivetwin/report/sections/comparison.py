@@ -7,11 +7,24 @@ import math
 from collections.abc import Sequence
 
 from drivetwin._util.display_units import (
-    Display,
     format_significant,
     get_display_unit,
 )
-from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.report.blocks import (
+    Block,
+    Cell,
+    Column,
+    FigureBlock,
+    Section,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    Tone,
+    make_badge,
+    make_notes,
+    make_number,
+    make_table,
+)
 from drivetwin.report.figures.comparison import (
     build_trial_panels,
     plot_agreement,
@@ -21,21 +34,10 @@ from drivetwin.report.figures.comparison import (
 )
 from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.blocks import (
-    Block,
-    Cell,
-    FigureBlock,
-    NotesBlock,
-    Section,
-    TableBlock,
-    Tile,
-    TilesBlock,
-    Tone,
-    make_cells,
-)
-from drivetwin.report.sections.fits import SIGNALS, make_fit_head, make_fit_row
-from drivetwin.report.sections.parameters import format_estimate
+from drivetwin.report.sections.fits import build_labelled_fits
+from drivetwin.report.sections.parameters import make_parameter_cell, make_value_cell
 from drivetwin.shifts.shift import Shift
+from drivetwin.validation.simulate_log import SIGNALS
 
 
 def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
@@ -44,13 +46,12 @@ def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
     judged = [one for one in found if one.agrees is not None]
     differing = [one for one in judged if not one.agrees]
     blocks: list[Block] = [TilesBlock(_build_tiles(candidates, judged, differing))]
-    if differing:
-        texts = [
-            f"{get_parameter_label(one.id)}: {format_significant(one.apart or 0.0, 2)} "
-            f"standard deviations"
-            for one in differing
-        ]
-        blocks.append(NotesBlock("Differ by more than their uncertainty", texts, Tone.DOUBTFUL))
+    texts = [
+        f"{get_parameter_label(one.id)}: {format_significant(one.apart or 0.0, 2)} "
+        f"standard deviations"
+        for one in differing
+    ]
+    blocks += make_notes("Differ by more than their uncertainty", texts, Tone.DOUBTFUL)
     blocks.append(_build_parameter_table(candidates, found))
     if judged:
         blocks.append(
@@ -95,33 +96,13 @@ def _build_parameter_table(
 ) -> TableBlock:
     rows = []
     for one in found:
-        estimate = next(each for each in one.estimates if each is not None)
-        display = get_display_unit(estimate.unit)
-        rows.append(
-            (
-                Cell(get_parameter_label(one.id), note=one.id),
-                *(make_value_cell(each, display) for each in one.estimates),
-                Cell(display.label),
-                Cell("–" if one.apart is None else format_significant(one.apart, 2), number=True),
-                _make_verdict_cell(one, candidates),
-            )
-        )
-    head = (
-        Cell("parameter"),
-        *(Cell(one.name, number=True, note="± 95 % total") for one in candidates),
-        Cell("unit"),
-        Cell("apart", number=True, note="σ"),
-        Cell("verdict"),
-    )
-    return TableBlock("Parameters side by side.", head, rows)
-
-
-def make_value_cell(one: Estimate | None, display: Display) -> Cell:
-    """Format a value with its total 95 % half width below; a dash without a value."""
-    if one is None or one.value is None:
-        return Cell("–", number=True, note="" if one is None else one.verdict.value)
-    value, width = format_estimate(one, one.std_total, display)
-    return Cell(value, number=True, note="" if width == "–" else f"± {width}")
+        display = get_display_unit(next(each.unit for each in one.estimates if each is not None))
+        values = (make_value_cell(each, display) for each in one.estimates)
+        verdict = _make_verdict_cell(one, candidates)
+        rows.append((make_parameter_cell(one.id), *values, display.label, one.apart, verdict))
+    names = (make_number(one.name, "± 95 % total") for one in candidates)
+    columns: Sequence[Column] = ("parameter", *names, "unit", ("apart", "2", "σ"), "verdict")
+    return make_table("Parameters side by side.", columns, rows)
 
 
 def _make_verdict_cell(one: Agreement, candidates: Sequence[Candidate]) -> Cell:
@@ -129,9 +110,9 @@ def _make_verdict_cell(one: Agreement, candidates: Sequence[Candidate]) -> Cell:
     note = f"no interval: {bare}" if bare else ""
     if one.agrees is None:
         alone = sum(each is not None and each.value is not None for each in one.estimates) < 2
-        return Cell("") if alone else Cell("not judged", badge=True, tone=Tone.UNKNOWN, note=note)
+        return Cell("") if alone else make_badge("not judged", Tone.UNKNOWN, note)
     word, tone = ("agree", Tone.GOOD) if one.agrees else ("differ", Tone.DOUBTFUL)
-    return Cell(word, badge=True, tone=tone, note=note)
+    return make_badge(word, tone, note)
 
 
 def build_friction_overlay_section(candidates: Sequence[Candidate]) -> Section:
@@ -175,9 +156,8 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
                 )
             )
             shifts.append(_build_trial_table(trial, shift))
-        if trial.refused:
-            texts = [f"{name}: {why}" for name, why in trial.refused.items()]
-            shifts.append(NotesBlock(f"Not simulated: {trial.label}", texts, Tone.DOUBTFUL))
+        texts = [f"{name}: {why}" for name, why in trial.refused.items()]
+        shifts += make_notes(f"Not simulated: {trial.label}", texts, Tone.DOUBTFUL)
     each = Section("shifts", "Shift by shift", "Residuals are measured minus simulated.", shifts)
     if len(candidates) == 1 and len(trials) == 1:
         return [each]
@@ -206,26 +186,23 @@ def _collect_fit_percent(order: Sequence[str], trials: Sequence[Trial]) -> list[
 
 
 def _build_trial_table(trial: Trial, shift: Shift) -> TableBlock:
-    rows = [
-        make_fit_row((name, label), run.fit[signal], display)
+    fits = {
+        name: {signal: run.fit[signal] for signal in SIGNALS if signal in run.fit}
         for name, run in trial.runs.items()
-        for signal, (label, display) in SIGNALS.items()
-        if signal in run.fit
-    ]
+    }
     caption = (
         f"Fit by phase, {trial.label}: {shift.offgoing} off-going, {shift.oncoming} on-coming."
     )
-    return TableBlock(caption, make_fit_head("model", "signal"), rows)
+    return build_labelled_fits(fits, caption, "model")
 
 
 def build_origin_section(candidates: Sequence[Candidate]) -> Section:
     """List the source files of each candidate."""
     rows = [
-        make_cells(one.name, one.method, one.version, file, digest)
+        (one.name, one.method, one.version, file, digest)
         for one in candidates
         for file, digest in one.inputs.items()
     ]
-    head = make_cells("identification", "method", "version", "input", "SHA-256")
-    return Section(
-        "origin", "Origin", "Inputs of each identification.", [TableBlock("", head, rows)]
-    )
+    columns = ("identification", "method", "version", "input", "SHA-256")
+    table = make_table("", columns, rows)
+    return Section("origin", "Origin", "Inputs of each identification.", [table])

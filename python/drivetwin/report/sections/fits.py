@@ -4,26 +4,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from drivetwin._util.display_units import NM, RPM, Display, format_significant
+from drivetwin._util.display_units import format_significant
 from drivetwin.estimation.result.estimate import SignalFit
-from drivetwin.report.sections.blocks import Cell, TableBlock, Tone, make_cells
+from drivetwin.report.blocks import Cell, TableBlock, Tone, make_number, make_table
+from drivetwin.report.labels import get_channel_display, get_channel_label
 
 Fits = Mapping[str, SignalFit]
 """Fit by phase."""
 
-SIGNALS: dict[str, tuple[str, Display]] = {
-    "output_torque": ("output torque", NM),
-    "input_speed": ("input speed", RPM),
-    "output_speed": ("output speed", RPM),
-}
-"""Signals that the fit is about: label and display unit."""
-EXTRA_SIGNALS: dict[str, tuple[str, Display]] = {
-    "engine_speed": ("engine speed", RPM),
-    "wheel_speed": ("wheel speed", RPM),
-}
-"""Signals that are compared too."""
 PHASES = {
     "all": "whole",
     "before": "1 before",
@@ -47,32 +37,32 @@ FIT_CAPTION = (
 
 def build_fit_table(fit: Mapping[str, Fits], caption: str = FIT_CAPTION) -> TableBlock:
     """Fit % and rmse by signal and phase; the phase that the simulation misses is marked."""
+    return build_labelled_fits({"": fit}, caption)
+
+
+def build_labelled_fits(
+    fits: Mapping[str, Mapping[str, Fits]], caption: str, label: str = ""
+) -> TableBlock:
+    """Table of several fits, by name in a first column with the head `label`, if it has one."""
     rows = [
-        make_fit_row((label,), fit[name], display)
-        for name, (label, display) in {**SIGNALS, **EXTRA_SIGNALS}.items()
-        if name in fit
+        (*([name] if label else ()), get_channel_label(signal), *_make_phase_cells(signal, phases))
+        for name, fit in fits.items()
+        for signal, phases in fit.items()
     ]
-    return TableBlock(caption, make_fit_head("signal"), rows)
+    columns = (*([label] if label else ()), "signal", *map(make_number, PHASES.values()))
+    return make_table(caption, columns, rows)
 
 
-def make_fit_head(*labels: str) -> tuple[Cell, ...]:
-    """Head of a table of fits: columns of labels, then one column for each phase."""
-    return (*make_cells(*labels), *make_cells(*PHASES.values(), number=True))
-
-
-def make_fit_row(labels: Sequence[str], fits: Fits, display: Display) -> tuple[Cell, ...]:
-    """Row of a table of fits."""
+def _make_phase_cells(signal: str, fits: Fits) -> list[Cell]:
     missed = find_missed_phase(fits) if "all" in fits else ""
-    return (
-        *make_cells(*labels),
-        *(make_fit_cell(fits.get(phase), display, doubtful=phase == missed) for phase in PHASES),
-    )
+    return [make_fit_cell(fits.get(one), signal, doubtful=one == missed) for one in PHASES]
 
 
-def make_fit_cell(fit: SignalFit | None, display: Display, *, doubtful: bool = False) -> Cell:
+def make_fit_cell(fit: SignalFit | None, signal: str, *, doubtful: bool = False) -> Cell:
     """Format the fit in % with the error in its unit below; a dash without a fit."""
     if fit is None:
-        return Cell("–", number=True)
+        return make_number("–")
+    display = get_channel_display(signal)
     note = f"{format_significant(fit.rmse * display.factor, 3)} {display.label}"
     text = f"{fit.fit_percent:z.1f} %" if math.isfinite(fit.fit_percent) else "–"
     tone = Tone.DOUBTFUL if doubtful else Tone.PLAIN

@@ -3,30 +3,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 
-from drivetwin._util.display_units import Display, format_significant, get_display_unit
+from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.suggestion import CardNumber, CardNumberKind, ExperimentRanking
 from drivetwin.estimation.result.verdict import get_advice
+from drivetwin.report.blocks import (
+    Block,
+    Cell,
+    FigureBlock,
+    Section,
+    TableBlock,
+    make_badge,
+    make_notes,
+    make_table,
+)
 from drivetwin.report.figures.parameters import (
     compute_half_width_percent,
     plot_correlation,
     plot_intervals,
 )
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.blocks import (
-    Block,
-    Cell,
-    FigureBlock,
-    NotesBlock,
-    Section,
-    TableBlock,
-    make_cells,
-)
-from drivetwin.report.sections.parameters import TONES
+from drivetwin.report.sections.parameters import TONES, make_parameter_cell
 
 _INSEPARABLE = (
     "μ and the clutch geometry N·D·A·r: only their product acts.",
@@ -45,9 +46,9 @@ def build_limits_section(found: Identification) -> Section:
     """Build the section on intervals, correlated parameters, and helpful experiments."""
     suggestions = found.evidence.suggestions
     narrower = (
-        _build_suggestion_tables(suggestions, found)
+        build_suggestion_blocks(suggestions, found.estimates)
         if suggestions
-        else _build_uncertainty_tables(found)
+        else list(_build_uncertainty_tables(found))
     )
     intervals = FigureBlock(
         plot_intervals(found.estimates),
@@ -55,11 +56,9 @@ def build_limits_section(found: Identification) -> Section:
         "effects that the model leaves out; bars: noise alone.",
     )
     blocks: list[Block] = [intervals, *narrower]
-    blocks.append(NotesBlock("Not separable from any one shift", _INSEPARABLE))
+    blocks += make_notes("Not separable from any one shift", _INSEPARABLE)
     if found.correlation is not None:
-        pairs = list(_list_correlated_pairs(found))
-        if pairs:
-            blocks.append(NotesBlock("Strongly correlated parameters", pairs))
+        blocks += make_notes("Strongly correlated parameters", _list_correlated_pairs(found))
         blocks.append(
             FigureBlock(
                 plot_correlation(found.correlation_ids, found.correlation),
@@ -75,42 +74,47 @@ def build_limits_section(found: Identification) -> Section:
     )
 
 
-def _build_suggestion_tables(
-    suggestions: Sequence[ExperimentRanking], found: Identification
-) -> Iterator[TableBlock]:
-    """Tabulate the simulated gain of the best experiment for each uncertain parameter."""
-    rows = []
+def build_suggestion_blocks(
+    suggestions: Sequence[ExperimentRanking], estimates: Mapping[str, Estimate]
+) -> list[Block]:
+    """Simulated gain of the best experiment for each parameter, and why others have none."""
+    rows, reasons = [], dict[str, list[str]]()
     for one in suggestions:
-        display = get_display_unit(found.estimates[one.parameter].unit)
-        then = None if one.best is None else one.best.half_width
-        number = one.best_number
+        unit, best, number = estimates[one.parameter].unit, one.best, one.best_number
+        if best is None:
+            reasons.setdefault(one.text, []).append(get_parameter_label(one.parameter))
+        if best is None and number is None:
+            continue
         known = None if number is None else number.share * one.half_width
         rows.append(
             (
-                Cell(get_parameter_label(one.parameter)),
-                Cell(one.verdict.value, badge=True, tone=TONES[one.verdict]),
-                Cell(_format_half_width(one.half_width, display), number=True),
-                Cell(one.text),
-                Cell("–" if then is None else _format_half_width(then, display), number=True),
-                Cell("–" if number is None else _name_number(number)),
-                Cell("–" if known is None else _format_half_width(known, display), number=True),
+                make_parameter_cell(one.parameter),
+                make_badge(one.verdict.value, TONES[one.verdict]),
+                format_half_width(one.half_width, unit),
+                None if best is None else one.text,
+                None if best is None else format_half_width(best.half_width, unit),
+                None if number is None else _name_number(number),
+                None if known is None else format_half_width(known, unit),
             )
         )
-    head = (
-        *make_cells("parameter", "verdict"),
-        Cell("now", number=True, note="± 95 %"),
-        Cell("experiment that would narrow it"),
-        Cell("then", number=True, note="± 95 %, to expect"),
-        Cell("number that would narrow it if exact on the card"),
-        Cell("then", number=True, note="± 95 %, to expect"),
+    columns = (
+        "parameter",
+        Cell("verdict", secondary=True),
+        ("now", "s", "± 95 %"),
+        "experiment that would narrow it",
+        ("then", "s", "± 95 %, to expect"),
+        "number that would narrow it if exact on the card",
+        ("then", "s", "± 95 %, to expect"),
     )
-    yield TableBlock(
+    table = make_table(
         "Next recordings: each experiment was simulated with this model and the noise of this "
         "log's sensors, and the information it adds gives the interval to expect. A number on the "
         "card that is known exactly takes its share of the variance away.",
-        head,
+        columns,
         rows,
     )
+    texts = [f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    return [*([table] if rows else []), *make_notes("Not narrowed by an experiment", texts)]
 
 
 def _name_number(number: CardNumber) -> str:
@@ -118,9 +122,11 @@ def _name_number(number: CardNumber) -> str:
     return get_parameter_label(number.name) if is_parameter else number.text
 
 
-def _format_half_width(value: float, display: Display) -> str:
+def format_half_width(value: float, unit: str) -> str:
+    """Format the half width of an interval [SI] with its unit; `open` where infinite."""
     if not isfinite(value):
         return "open"
+    display = get_display_unit(unit)
     return f"± {format_significant(value * display.factor, 2)} {display.label}".removesuffix(" –")
 
 
@@ -132,28 +138,26 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
         if one.verdict in (Verdict.IDENTIFIED, Verdict.WEAK) and one.unit != "s"
     }
     ranked = sorted((w, name) for name, w in widths.items() if w is not None)[::-1][:_LEAST_KNOWN]
-    if ranked:
-        rows = [
-            (
-                Cell(get_parameter_label(name)),
-                Cell(f"± {format_significant(width, 2)} %", number=True),
-                Cell(_describe_sensor_share(found.estimates[name]), number=True),
-                Cell(_write_advice(found.estimates[name])),
-            )
-            for width, name in ranked
-        ]
-        head = (
-            Cell("parameter"),
-            Cell("interval", number=True, note="95 %, of the value"),
-            Cell("from sensors and effects", number=True, note="share of the variance"),
-            Cell("what would narrow it"),
-        )
-        yield TableBlock(
-            "The least certain parameters. Experiments cannot narrow the part of an interval that "
-            "comes from sensor tolerances and effects.",
-            head,
-            rows,
-        )
+    if not ranked:
+        return
+    rows = []
+    for width, name in ranked:
+        one = found.estimates[name]
+        interval = f"± {format_significant(width, 2)} %"
+        share, advice = _describe_sensor_share(one), _write_advice(one)
+        rows.append((make_parameter_cell(name), interval, share, advice))
+    columns = (
+        "parameter",
+        ("interval", "s", "95 %, of the value"),
+        ("from sensors and effects", "s", "share of the variance"),
+        "what would narrow it",
+    )
+    yield make_table(
+        "The least certain parameters. Experiments cannot narrow the part of an interval that "
+        "comes from sensor tolerances and effects.",
+        columns,
+        rows,
+    )
 
 
 def _write_advice(one: Estimate) -> str:

@@ -19,19 +19,22 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import compute_sensitivity
-from drivetwin.report.figures.residuals import build_residual_panels, plot_residuals
-from drivetwin.report.figures.sensitivity import plot_sensitivity
-from drivetwin.report.figures.shift_phases import get_shift_spans
-from drivetwin.report.labels import get_channel_label
-from drivetwin.report.sections.blocks import (
+from drivetwin.report.blocks import (
     Block,
     Cell,
+    Column,
     FigureBlock,
     Section,
     TableBlock,
     Tone,
     make_link,
+    make_number,
+    make_table,
 )
+from drivetwin.report.figures.residuals import build_residual_panels, plot_residuals
+from drivetwin.report.figures.sensitivity import plot_sensitivity
+from drivetwin.report.figures.shift_phases import get_shift_spans
+from drivetwin.report.labels import get_channel_label
 from drivetwin.shifts.shift import make_shift_labels
 
 
@@ -98,37 +101,31 @@ def _build_test_table(tests: Sequence[tuple[str, Sequence[ResidualTest]]]) -> Ta
     sources = dict.fromkeys(
         source for _, group in tests for test in group for source in test.correlation
     )
-    head = (
-        Cell("shift"),
-        Cell("residual of"),
-        Cell("power of slow part", number=True, note="1 for noise"),
-        *(Cell(f"goes with {source}", number=True, note="σ") for source in sources),
+    columns: Sequence[Column] = (
+        *("shift", "residual of"),
+        make_number("power of slow part", "1 for noise"),
+        *(make_number(f"goes with {source}", "σ") for source in sources),
     )
-    rows = [
-        (
-            Cell(label),
-            Cell(get_channel_label(test.output)),
-            _make_test_cell(
-                format_significant(test.excess, 2), good=test.excess <= MAX_EXCESS_POWER
-            ),
-            *(_make_correlation_cell(test.correlation.get(source)) for source in sources),
-        )
-        for label, group in tests
-        for test in group
-    ]
-    return TableBlock(
+    rows = []
+    for label, group in tests:
+        for test in group:
+            excess = format_significant(test.excess, 2)
+            power = _make_test_cell(excess, good=test.excess <= MAX_EXCESS_POWER)
+            goes = (_make_correlation_cell(test.correlation.get(source)) for source in sources)
+            rows.append((label, get_channel_label(test.output), power, *goes))
+    return make_table(
         f"Residual tests. Slow part: power of means over {1e3 * COLOURED_NOISE.block:.0f} ms "
         f"over that of white noise, doubtful above {MAX_EXCESS_POWER:g}. Correlation with an "
         f"input in standard deviations of chance, doubtful beyond ±{SIGNIFICANT:g}.",
-        head,
+        columns,
         rows,
     )
 
 
-def _make_correlation_cell(size: float | None) -> Cell:
-    """Format the correlation with one input; a dash if the shift lacks that input."""
+def _make_correlation_cell(size: float | None) -> Cell | None:
+    """Format the correlation with one input; None if the shift lacks that input."""
     if size is None:
-        return Cell("–", number=True)
+        return None
     return _make_test_cell(f"{size:+z.1f}".replace("-", "−"), good=abs(size) <= SIGNIFICANT)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""First sections: verdict on the model, its parameters, and the findings by severity."""
+"""First section: verdict on the model, and its parameters."""
 
 from __future__ import annotations
 
@@ -14,24 +14,23 @@ from drivetwin._util.display_units import (
 )
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
-from drivetwin.estimation.result.status import ModelStatus
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.findings import Finding, Severity, render
-from drivetwin.report.figures.validation import build_overview_panels, plot_overview
-from drivetwin.report.labels import get_estimate_label, get_estimate_name
-from drivetwin.report.model_verdict import explain_identification
-from drivetwin.report.sections.blocks import (
+from drivetwin.report.blocks import (
     Block,
     Cell,
     FigureBlock,
-    NotesBlock,
     Section,
     TableBlock,
     Tone,
-    VerdictBlock,
-    make_cells,
+    make_badge,
     make_link,
+    make_notes,
+    make_number,
+    make_table,
 )
+from drivetwin.report.figures.validation import build_overview_panels, plot_overview
+from drivetwin.report.labels import get_estimate_label, get_estimate_name, get_parameter_label
+from drivetwin.report.model_verdict import build_verdict_block, explain_identification
 
 TONES = {
     Verdict.IDENTIFIED: Tone.GOOD,
@@ -39,22 +38,11 @@ TONES = {
     Verdict.NOT_IDENTIFIABLE: Tone.UNKNOWN,
     Verdict.DESIGN: Tone.PLAIN,
 }
-STATUS_TONES = {
-    ModelStatus.VALID: Tone.GOOD,
-    ModelStatus.LIMITED: Tone.DOUBTFUL,
-    ModelStatus.NOT_VALID: Tone.BAD,
-    ModelStatus.NOT_VALIDATED: Tone.DOUBTFUL,
-}
-_SEVERITIES = (
-    (Severity.ERROR, "Errors", Tone.BAD),
-    (Severity.WARNING, "Warnings", Tone.DOUBTFUL),
-    (Severity.INFO, "Information", Tone.PLAIN),
-)
 
 
 def build_result_section(found: Identification) -> Section:
     """Verdict, simulation over measurement of one shift, parameters and their remarks."""
-    blocks: list[Block] = [_build_verdict_block(found)]
+    blocks: list[Block] = [build_verdict_block(explain_identification(found))]
     if found.evidence.validation:
         blocks.append(_build_overview(found.evidence.validation))
     blocks += build_parameter_blocks(found.estimates)
@@ -69,32 +57,8 @@ def build_parameter_blocks(
         f"({number}) {', '.join(_list_labels(estimates, reason))}: {reason}"
         for reason, number in _number_reasons(estimates.values()).items()
     ]
-    notes = [NotesBlock("Remarks on parameters", remarks)] if remarks else []
-    return [build_parameter_table(estimates, caption), *notes]
-
-
-def build_findings_section(findings: Sequence[Finding]) -> Section:
-    """Findings by severity, errors first, each group with the tables of its findings."""
-    blocks: list[Block] = []
-    for severity, heading, tone in _SEVERITIES:
-        alike = [one for one in findings if one.severity is severity]
-        if alike:
-            blocks.append(NotesBlock(heading, render(alike), tone))
-        blocks += [_build_rows_table(one) for one in alike if one.rows]
-    intro = "Remarks on log, vehicle card and fit, with cause and remedy."
-    return Section("findings", "Findings", intro, blocks)
-
-
-def _build_rows_table(one: Finding) -> TableBlock:
-    """Build the table of a finding; its caption is the cause."""
-    rows = [make_cells(*cells) for cells in one.cells]
-    return TableBlock(one.cause, make_cells(*one.heads), rows)
-
-
-def _build_verdict_block(found: Identification) -> VerdictBlock:
-    verdict = explain_identification(found)
-    tone = STATUS_TONES[verdict.status]
-    return VerdictBlock(verdict.status.value, verdict.reason, verdict.action, tone)
+    table = build_parameter_table(estimates, caption)
+    return [table, *make_notes("Remarks on parameters", remarks)]
 
 
 def _build_overview(validations: Sequence[Validation]) -> FigureBlock:
@@ -134,13 +98,13 @@ def build_parameter_table(
     estimates: Mapping[str, Estimate], caption: str | None = None
 ) -> TableBlock:
     """All parameters with their intervals and verdicts; the caption counts the latter if None."""
-    head = (
-        Cell("parameter"),
-        Cell("value", number=True),
-        Cell("± 95 %", number=True, note="sensors and effects"),
-        Cell("± 95 %", number=True, note="noise alone", secondary=True),
-        Cell("unit"),
-        Cell("verdict"),
+    columns = (
+        "parameter",
+        ("value", "s"),
+        ("± 95 %", "s", "sensors and effects"),
+        make_number("± 95 %", "noise alone", secondary=True),
+        "unit",
+        "verdict",
         Cell("method", secondary=True),
     )
     counted = _count_parameters(estimates)
@@ -149,11 +113,11 @@ def build_parameter_table(
             " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
         )
     numbers = _number_reasons(estimates.values())
-    rows = [
+    rows = (
         _build_parameter_row(one, f" ({numbers[one.reason]})" if one.reason else "")
         for one in estimates.values()
-    ]
-    return TableBlock(counted if caption is None else caption, head, rows)
+    )
+    return make_table(counted if caption is None else caption, columns, rows)
 
 
 def _number_reasons(estimates: Iterable[Estimate]) -> dict[str, int]:
@@ -166,20 +130,14 @@ def _list_labels(estimates: Mapping[str, Estimate], reason: str) -> list[str]:
     return [get_estimate_label(one) for one in estimates.values() if one.reason == reason]
 
 
-def _build_parameter_row(estimate: Estimate, mark: str) -> tuple[Cell, ...]:
+def _build_parameter_row(estimate: Estimate, mark: str) -> tuple[object, ...]:
     display = scale_display(get_display_unit(estimate.unit), estimate.value or 0.0)
     value, total = format_estimate(estimate, estimate.std_total, display)
     _, noise = format_estimate(estimate, estimate.std_noise, display)
     is_symbol = get_estimate_label(estimate) == estimate.id
-    return (
-        Cell(get_estimate_name(estimate), note="" if is_symbol else estimate.id),
-        Cell(value, number=True),
-        Cell(total, number=True),
-        Cell(noise, number=True, secondary=True),
-        Cell(display.label),
-        Cell(f"{estimate.verdict.value}{mark}", badge=True, tone=TONES[estimate.verdict]),
-        Cell(estimate.method, secondary=True),
-    )
+    name = Cell(get_estimate_name(estimate), note="" if is_symbol else estimate.id)
+    verdict = make_badge(f"{estimate.verdict.value}{mark}", TONES[estimate.verdict])
+    return name, value, total, noise, display.label, verdict, estimate.method
 
 
 def format_estimate(estimate: Estimate, std: float | None, display: Display) -> tuple[str, str]:
@@ -189,3 +147,17 @@ def format_estimate(estimate: Estimate, std: float | None, display: Display) -> 
     half = None if std is None else Z95 * std * display.factor
     value, width = format_uncertainty(estimate.value * display.factor, half)
     return value, width or "–"
+
+
+def make_parameter_cell(name: str) -> Cell:
+    """Make the cell of a parameter: its symbol, and below it the id by which commands name it."""
+    label = get_parameter_label(name)
+    return Cell(label, note="" if label == name else name)
+
+
+def make_value_cell(one: Estimate | None, display: Display) -> Cell:
+    """Format a value with its total 95 % half width below; a dash without a value."""
+    if one is None or one.value is None:
+        return make_number("–", "" if one is None else one.verdict.value)
+    value, width = format_estimate(one, one.std_total, display)
+    return make_number(value, "" if width == "–" else f"± {width}")

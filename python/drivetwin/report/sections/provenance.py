@@ -3,17 +3,10 @@
 
 from __future__ import annotations
 
-from drivetwin._util.display_units import BAR, NM, RAD_PER_S, RPM, Display, format_significant
+from drivetwin._util.display_units import BAR, NM, RAD_PER_S, RPM, Display
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification
-from drivetwin.report.sections.blocks import (
-    Block,
-    Cell,
-    NotesBlock,
-    Section,
-    TableBlock,
-    make_cells,
-)
+from drivetwin.report.blocks import Section, TableBlock, make_notes, make_table
 from drivetwin.twin.build import list_borrowed_friction
 
 _RANGES: dict[str, tuple[str, Display]] = {
@@ -26,18 +19,9 @@ _RANGES: dict[str, tuple[str, Display]] = {
 
 def build_provenance_section(found: Identification) -> Section:
     """Assumptions, range of validity, versions, hashes; the settings are in the result file."""
-    blocks: list[Block] = []
-    assumed = (*found.assumptions, *list_borrowed_friction(found))
-    if assumed:
-        blocks.append(NotesBlock("Assumed", assumed))
-    blocks.append(_build_validity_table(found))
-    blocks.append(
-        TableBlock(
-            "Inputs.",
-            make_cells("file", "SHA-256"),
-            [make_cells(name, sha) for name, sha in found.inputs.items()],
-        )
-    )
+    blocks = make_notes("Assumed", (*found.assumptions, *list_borrowed_friction(found)))
+    inputs = make_table("Inputs.", ("file", "SHA-256"), found.inputs.items())
+    blocks += [_build_validity_table(found), inputs]
     return Section(
         "provenance",
         "Assumptions and origin",
@@ -48,17 +32,11 @@ def build_provenance_section(found: Identification) -> Section:
 
 def _build_validity_table(found: Identification) -> TableBlock:
     rows = []
-    for name, (low, high) in found.validity.items():
+    for name, ends in found.validity.items():
         label, display = _RANGES.get(name, (name, Display("SI")))
-        rows.append(
-            (
-                Cell(label),
-                Cell(format_significant(low * display.factor), number=True),
-                Cell(format_significant(high * display.factor), number=True),
-                Cell(display.label),
-            )
-        )
-    head = (Cell("quantity"), Cell("from", number=True), Cell("to", number=True), Cell("unit"))
-    return TableBlock(
-        "Range covered by the log; the model is not validated outside it.", head, rows
+        rows.append((label, *(end * display.factor for end in ends), display.label))
+    return make_table(
+        "Range covered by the log; the model is not validated outside it.",
+        ("quantity", ("from", "4"), ("to", "4"), "unit"),
+        rows,
     )

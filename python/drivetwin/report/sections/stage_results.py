@@ -7,26 +7,26 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-from drivetwin._util.display_units import format_significant
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.paper.wlse import GridFit
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
+from drivetwin.report.blocks import (
+    Block,
+    FigureBlock,
+    Section,
+    TableBlock,
+    Tone,
+    make_badge,
+    make_notes,
+    make_table,
+)
 from drivetwin.report.figures.load import plot_load
 from drivetwin.report.figures.momentum import plot_momentum
 from drivetwin.report.figures.ringdown import build_ringdown_panels, plot_ringdown
 from drivetwin.report.figures.wlse import WlseLabels, plot_wlse
-from drivetwin.report.sections.blocks import (
-    Block,
-    Cell,
-    FigureBlock,
-    NotesBlock,
-    Section,
-    TableBlock,
-    Tone,
-)
 from drivetwin.shifts.shift import make_shift_labels
 
 INERTIA_LABELS = WlseLabels(
@@ -181,30 +181,28 @@ def _build_grid_blocks(
         "plausible range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise "
         "in the differenced speed biases it."
     )
-    blocks: list[Block] = [FigureBlock(plot_wlse(fit, labels), text)]
-    if doubt:
-        blocks.append(NotesBlock("Not to be relied on", doubt, Tone.DOUBTFUL))
-    return [*blocks, build_grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD)]
+    notes = make_notes("Not to be relied on", doubt, Tone.DOUBTFUL)
+    table = build_grid_table(fit, labels, Tone.DOUBTFUL if doubt else Tone.GOOD)
+    return [FigureBlock(plot_wlse(fit, labels), text), *notes, table]
 
 
 def build_grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -> TableBlock:
     """The grid as in the paper's Table 1; the row of least error is marked in `tone`."""
-    head = (
-        Cell(f"{labels.grid} [{labels.unit}]", number=True),
-        Cell(f"{labels.inertia} [kg·m²]", number=True),
-        Cell("RMS error [Nm]", number=True),
-        Cell(""),
+    columns = (
+        (f"{labels.grid} [{labels.unit}]", "g"),
+        (f"{labels.inertia} [kg·m²]", "4"),
+        ("RMS error [Nm]", "4"),
+        "",
     )
-    rows = [
+    rows = (
         (
-            Cell(f"{row.value:g}", number=True),
-            Cell(format_significant(row.inertia), number=True),
-            Cell(format_significant(row.rmse), number=True),
-            Cell("least error" if row == fit.best else "", badge=True, tone=tone),
+            *(row.value, row.inertia, row.rmse),
+            make_badge("least error", tone) if row == fit.best else "",
         )
         for row in fit.rows
-    ]
-    return TableBlock("Grid search as in Table 1, RMS error at the output shaft.", head, rows)
+    )
+    caption = "Grid search as in Table 1, RMS error at the output shaft."
+    return make_table(caption, columns, rows)
 
 
 def _build_ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
@@ -227,4 +225,4 @@ def _list_refusals(shifts: Iterable[_AnyStages], stage: str) -> list[Block]:
     texts = [
         f"{one.by}: {one.stages.refusals[stage]}" for one in shifts if stage in one.stages.refusals
     ]
-    return [NotesBlock("Not possible here", texts, Tone.DOUBTFUL)] if texts else []
+    return make_notes("Not possible here", texts, Tone.DOUBTFUL)

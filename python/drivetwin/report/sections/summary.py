@@ -3,12 +3,24 @@
 
 from __future__ import annotations
 
-from drivetwin._util.display_units import format_significant, format_with_unit
+from collections.abc import Mapping
+
+from drivetwin._util.display_units import format_significant, format_uncertainty, format_with_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.findings import render
+from drivetwin.report.blocks import (
+    Block,
+    FigureBlock,
+    Section,
+    TableBlock,
+    Tone,
+    make_link,
+    make_notes,
+    make_table,
+)
 from drivetwin.report.figures.friction import plot_friction
 from drivetwin.report.figures.recording import build_log_panels, plot_log
 from drivetwin.report.figures.shift_phases import build_shift_panels, plot_shift_phases
@@ -18,20 +30,9 @@ from drivetwin.report.figures.validation import (
     plot_further_signals,
     plot_validation,
 )
-from drivetwin.report.sections.blocks import (
-    Block,
-    Cell,
-    FigureBlock,
-    NotesBlock,
-    Section,
-    TableBlock,
-    Tone,
-    make_cells,
-    make_link,
-)
-from drivetwin.report.sections.fits import EXTRA_SIGNALS, SIGNALS, build_fit_table
+from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.shifts.shift import Shift, make_shift_labels
-from drivetwin.validation.simulate_log import pool_fits
+from drivetwin.validation.simulate_log import EXTRA_SIGNALS, SIGNALS, pool_fits
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 _TORQUE_PHASE = {
@@ -86,12 +87,10 @@ def build_shift_section(found: Identification, log: ShiftLog) -> Section:
                 make_link(shift),
             )
         )
-        blocks.append(_build_phase_table(name, shift))
-        if shift.findings:
-            blocks.append(NotesBlock("About this shift", render(shift.findings), Tone.DOUBTFUL))
-    if found.rejected:
-        texts = [f"{r.time[0]:z.2f} to {r.time[1]:z.2f} s: {r.reason}" for r in found.rejected]
-        blocks.append(NotesBlock("Not used", texts))
+        blocks.append(build_phase_table(name, shift))
+        blocks += make_notes("About this shift", render(shift.findings), Tone.DOUBTFUL)
+    texts = [f"{r.time[0]:z.2f} to {r.time[1]:z.2f} s: {r.reason}" for r in found.rejected]
+    blocks += make_notes("Not used", texts)
     return Section(
         "shift",
         "The log and its phases",
@@ -100,35 +99,28 @@ def build_shift_section(found: Identification, log: ShiftLog) -> Section:
     )
 
 
-def _build_phase_table(name: str, shift: Shift) -> TableBlock:
+def build_phase_table(name: str, shift: Shift) -> TableBlock:
+    """Phases of a shift, with the 95 % interval of the start of each."""
     spans = (
-        ("1 gear held", shift.before, None),
+        (f"1 gear {shift.start_gear} held", shift.before, ""),
         ("2 torque phase", shift.torque_phase, "torque_start"),
         ("3 inertia phase", shift.inertia_phase, "inertia_start"),
-        ("4 new gear locked", (shift.lockup_time, shift.after[1]), "lockup"),
+        (f"4 gear {shift.end_gear} locked", (shift.lockup_time, shift.after[1]), "lockup"),
     )
     rows = []
     for label, (start, end), boundary in spans:
-        sigma = shift.sigma.get(boundary) if boundary else None
+        sigma = shift.sigma.get(boundary)
         doubt = f"± {format_significant(1e3 * Z95 * sigma, 2)} ms" if sigma else ""
-        rows.append(
-            (
-                Cell(label),
-                Cell(f"{start:z.3f} s", number=True),
-                Cell(doubt, number=True),
-                Cell(f"{end:z.3f} s", number=True),
-                Cell(f"{1e3 * (end - start):z.0f} ms", number=True),
-            )
-        )
-    head = (
-        Cell("phase"),
-        Cell("starts", number=True),
-        Cell("± 95 %", number=True),
-        Cell("ends", number=True),
-        Cell("lasts", number=True),
+        rows.append((label, start, doubt, end, 1e3 * (end - start)))
+    columns = (
+        "phase",
+        ("starts [s]", "z.3f"),
+        ("± 95 %", "s"),
+        ("ends [s]", "z.3f"),
+        ("lasts [ms]", "z.0f"),
     )
-    elements = f"{shift.offgoing} off-going, {shift.oncoming} on-coming."
-    return TableBlock(f"Phases of shift {name}: {elements}", head, rows)
+    elements = f"{shift.kind}, {shift.offgoing} off-going, {shift.oncoming} on-coming."
+    return make_table(f"Phases of shift {name}: {elements}", columns, rows)
 
 
 def build_friction_section(found: Identification) -> Section:
@@ -137,6 +129,8 @@ def build_friction_section(found: Identification) -> Section:
     for element, curve in found.friction.items():
         caption = f"Friction of {element}, {_describe_verdict(curve)}. "
         blocks.append(FigureBlock(plot_friction(element, curve), caption + _format_law(curve)))
+    if found.friction:
+        blocks.append(build_friction_table(found.friction))
     over_eta = any(curve.over_eta for curve in found.friction.values())
     return Section(
         "friction",
@@ -200,12 +194,23 @@ def build_validation_section(validations: tuple[Validation, ...]) -> Section:
 def _build_event_table(validation: Validation) -> TableBlock:
     """Changes of friction mode; filling and venting repeat with every ripple of the pressure."""
     rows = [
-        make_cells(f"{event.time:z.4f} s", event.element, event.kind.replace("_", " "))
+        (event.time, event.element, event.kind.replace("_", " "))
         for event in validation.trajectory.events
         if event.kind not in ("fill", "vent")
     ]
-    return TableBlock(
-        f"Events of the simulation (status: {validation.status}).",
-        make_cells("time", "element", "event"),
-        rows,
-    )
+    caption = f"Events of the simulation (status: {validation.status})."
+    return make_table(caption, (("time [s]", "z.4f"), "element", "event"), rows)
+
+
+def build_friction_table(friction: Mapping[str, FrictionCurve]) -> TableBlock:
+    """μ with its 95 % band at the ends and the middle of the slip range seen, and its verdict."""
+    rows = []
+    for name, curve in friction.items():
+        first = (f"{name} ({curve.symbol})" if curve.over_eta else name, curve.verdict_text)
+        for index in (0, curve.slip.size // 2, curve.slip.size - 1):
+            half = 0.5 * float(curve.mu_hi[index] - curve.mu_lo[index])
+            value, width = format_uncertainty(float(curve.mu[index]), half)
+            rows.append((first[0], curve.slip[index], value, width, first[1]))
+            first = ("", "")
+    columns = ("element", ("slip [rad/s]", "z.1f"), ("μ", "s"), ("± 95 %", "s"), "verdict")
+    return make_table("Friction, for the gains on the vehicle card", columns, rows)

@@ -10,29 +10,39 @@ from pathlib import Path
 from drivetwin._util.display_units import Display, format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate
-from drivetwin.estimation.result.multi_log import CONSISTENCY, Consistency, LogShare, Several
+from drivetwin.estimation.result.multi_log import (
+    CONSISTENCY,
+    Consistency,
+    LogPull,
+    LogShare,
+    Several,
+)
 from drivetwin.estimation.result.validation import HeldOut, Outcome, Validation
 from drivetwin.findings import render
 from drivetwin.parameters import split_log_number
-from drivetwin.report.figures.comparison import plot_agreement
-from drivetwin.report.figures.validation import build_validation_panels, plot_validation
-from drivetwin.report.find_reports import Candidate, compare_estimates
-from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.blocks import (
+from drivetwin.report.blocks import (
     Block,
     Cell,
+    Column,
     FigureBlock,
-    NotesBlock,
     Section,
     TableBlock,
     Tile,
     TilesBlock,
     Tone,
-    make_cells,
+    make_badge,
     make_link,
+    make_notes,
+    make_number,
+    make_table,
 )
-from drivetwin.report.sections.comparison import make_value_cell
-from drivetwin.report.sections.fits import SIGNALS, build_fit_table, make_fit_cell
+from drivetwin.report.figures.comparison import plot_agreement
+from drivetwin.report.figures.validation import build_validation_panels, plot_validation
+from drivetwin.report.find_reports import Candidate, compare_estimates
+from drivetwin.report.labels import get_channel_display, get_channel_label, get_parameter_label
+from drivetwin.report.sections.fits import build_fit_table, make_fit_cell
+from drivetwin.report.sections.parameters import make_parameter_cell, make_value_cell
+from drivetwin.validation.simulate_log import SIGNALS
 
 _TONES = {
     Outcome.ALLOWED: Tone.GOOD,
@@ -62,7 +72,7 @@ def build_joint_section(found: Identification, several: Several) -> Section:
     compared = [one for one in compare_estimates(candidates) if one.apart is not None]
     blocks: list[Block] = [
         TilesBlock(tiles),
-        _build_log_table(found, several),
+        build_log_table(found, several),
         _build_shared_table(shared, several.logs, tested),
         FigureBlock(
             plot_agreement([*names, _TOGETHER], compared),
@@ -81,34 +91,27 @@ def build_joint_section(found: Identification, several: Several) -> Section:
     )
 
 
-def _build_log_table(found: Identification, several: Several) -> TableBlock:
+def build_log_table(found: Identification, several: Several) -> TableBlock:
     """File, shifts, own parameters and fit of each log."""
     own = {name: split_log_number(name) for name in found.estimates}
     plain = list(dict.fromkeys(name for name, number in own.values() if number))
     units = {
-        name: get_display_unit(found.estimates[f"{_find_log_id(name, own)}"].unit) for name in plain
+        name: get_display_unit(found.estimates[_find_log_id(name, own)].unit) for name in plain
     }
-    head = (
-        *make_cells("log", "file", "shifts"),
-        *(Cell(get_parameter_label(n), number=True, note=units[n].label) for n in plain),
-        *(Cell(f"fit of {label}", number=True) for label, _ in SIGNALS.values()),
-    )
     rows = []
     for one in several.logs:
         mine = {name: key for key, (name, number) in own.items() if number == one.number}
         shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in one.shifts)
-        rows.append(
-            (
-                *make_cells(str(one.number), Path(one.source).name, shifts),
-                *(make_value_cell(found.estimates.get(mine.get(n, "")), units[n]) for n in plain),
-                *(
-                    make_fit_cell(one.fit.get(signal, {}).get("all"), display)
-                    for signal, (_, display) in SIGNALS.items()
-                ),
-            )
-        )
-    return TableBlock(
-        "The logs with their log-specific parameters and the fit of the model.", head, rows
+        values = (make_value_cell(found.estimates.get(mine.get(n, "")), units[n]) for n in plain)
+        fits = (make_fit_cell(one.fit.get(signal, {}).get("all"), signal) for signal in SIGNALS)
+        rows.append((str(one.number), Path(one.source).name, shifts, *values, *fits))
+    columns: Sequence[Column] = (
+        *("log", "file", "shifts"),
+        *(make_number(get_parameter_label(n), units[n].label) for n in plain),
+        *(make_number(f"fit of {get_channel_label(signal)}") for signal in SIGNALS),
+    )
+    return make_table(
+        "The logs with their log-specific parameters and the fit of the model.", columns, rows
     )
 
 
@@ -125,38 +128,31 @@ def _build_shared_table(
     rows = []
     for name, estimate in shared.items():
         display, move = get_display_unit(estimate.unit), moves.get(name)
-        far = move is not None and abs(move.z) > CONSISTENCY.far
-        rows.append(
-            (
-                Cell(get_parameter_label(name), note=name),
-                *(make_value_cell(one.alone.get(name), display) for one in logs),
-                make_value_cell(estimate, display),
-                Cell(display.label),
-                Cell("–", number=True)
-                if move is None or move.z == 0.0
-                else Cell(
-                    f"{move.z:+z.1f} σ".replace("-", "−"),
-                    number=True,
-                    badge=True,
-                    tone=Tone.DOUBTFUL if far else Tone.GOOD,
-                    note=f"log {move.log}",
-                ),
-            )
-        )
-    head = (
-        Cell("parameter"),
-        *(Cell(f"log {one.number} alone", number=True, note="± 95 % total") for one in logs),
-        Cell(_TOGETHER, number=True, note="± 95 % total"),
-        Cell("unit"),
-        Cell("farthest off", number=True, note="a log against the others"),
+        alone = (make_value_cell(one.alone.get(name), display) for one in logs)
+        value = make_value_cell(estimate, display)
+        off = None if move is None or move.z == 0.0 else _make_pull_cell(move)
+        rows.append((make_parameter_cell(name), *alone, value, display.label, off))
+    columns: Sequence[Column] = (
+        "parameter",
+        *(make_number(f"log {one.number} alone", "± 95 % total") for one in logs),
+        make_number(_TOGETHER, "± 95 % total"),
+        "unit",
+        make_number("farthest off", "a log against the others"),
     )
-    return TableBlock(
+    return make_table(
         "Shared parameters. Farthest off: the largest deviation of one log from the "
         "others, in standard deviations of noise; doubtful beyond "
         f"{CONSISTENCY.far:g}.",
-        head,
+        columns,
         rows,
     )
+
+
+def _make_pull_cell(pull: LogPull) -> Cell:
+    """Make the cell of the log that is farthest off."""
+    tone = Tone.DOUBTFUL if abs(pull.z) > CONSISTENCY.far else Tone.GOOD
+    text = f"{pull.z:+z.1f} σ".replace("-", "−")
+    return Cell(text, number=True, badge=True, tone=tone, note=f"log {pull.log}")
 
 
 def build_holdout_section(found: Identification, held: Sequence[HeldOut]) -> Section:
@@ -165,20 +161,7 @@ def build_holdout_section(found: Identification, held: Sequence[HeldOut]) -> Sec
         Tile(one.name, _format_torque_fit(one), _TONES[one.outcome], one.outcome.value)
         for one in held
     ]
-    blocks: list[Block] = [TilesBlock(tiles), _build_judgement_table(found, held)]
-    own = list(_iterate_log_rows(held))
-    if own:
-        head = (
-            Cell("log"),
-            Cell("parameter"),
-            Cell("value", number=True),
-            *make_cells("unit", "from"),
-        )
-        text = "Log-specific parameters, from the gear held before the shift."
-        blocks.append(TableBlock(text, head, own))
-    notes = [f"{one.name}: {text}" for one in held for text in render(one.findings)]
-    if notes:
-        blocks.append(NotesBlock("About the predictions", notes, Tone.DOUBTFUL))
+    blocks: list[Block] = [TilesBlock(tiles), *build_judgement_blocks(found, held)]
     for one in held:
         if one.validation is not None:
             blocks += [*_build_prediction_blocks(one, one.validation)]
@@ -203,60 +186,64 @@ def _format_torque_fit(one: HeldOut) -> str:
     return f"{next(iter(fits.values()))['all'].fit_percent:z.1f} %"
 
 
+def build_judgement_blocks(found: Identification, held: Sequence[HeldOut]) -> list[Block]:
+    """Errors of the predictions, parameters of logs that were not fitted, and remarks."""
+    blocks: list[Block] = [_build_judgement_table(found, held)]
+    if own := list(_iterate_log_rows(held)):
+        text = "Log-specific parameters, from the gear held before the shift."
+        columns = ("log", "parameter", ("value", "s"), "unit", "from")
+        blocks.append(make_table(text, columns, own))
+    notes = [f"{one.name}: {text}" for one in held for text in render(one.findings)]
+    return [*blocks, *make_notes("About the predictions", notes, Tone.DOUBTFUL)]
+
+
 def _build_judgement_table(found: Identification, held: Sequence[HeldOut]) -> TableBlock:
-    head = (
-        *make_cells("shift", "signal"),
-        Cell("predicted", number=True, note="fit %, rmse"),
-        Cell("fitted", number=True, note="fit %, rmse"),
-        Cell("usual", number=True, note="rmse", secondary=True),
-        Cell("allowed", number=True, note="rmse"),
-        *make_cells("unit", "verdict"),
+    """Errors of the predictions beside those of the fitted shifts and the limit set by noise."""
+    columns = (
+        *("shift", "signal"),
+        ("predicted", "s", "fit %, rmse"),
+        ("fitted", "s", "fit %, rmse"),
+        make_number("usual", "rmse", secondary=True),
+        ("allowed", "s", "rmse"),
+        *("unit", "verdict"),
     )
-    rows = []
+    rows: list[Sequence[object]] = []
     for one in held:
         fits = {} if one.validation is None else one.validation.fit
         for signal, phases in fits.items():
-            label, display = SIGNALS[signal]
-            bound, outcome = one.bounds.get(signal), one.get_signal_outcome(signal)
-            usual, allowed = (None, None) if bound is None else (bound.usual, bound.largest)
+            display, bound = get_channel_display(signal), one.bounds.get(signal)
+            bounds = (None, None) if bound is None else (bound.usual, bound.largest)
+            outcome = one.get_signal_outcome(signal)
             rows.append(
                 (
-                    *make_cells(one.name, label),
-                    make_fit_cell(phases["all"], display),
-                    make_fit_cell(found.fit.get(signal, {}).get("all"), display),
-                    _make_bound_cell(usual, display, secondary=True),
-                    _make_bound_cell(allowed, display),
-                    Cell(display.label),
-                    Cell(outcome.value, badge=True, tone=_TONES[outcome]),
+                    *(one.name, get_channel_label(signal)),
+                    make_fit_cell(phases["all"], signal),
+                    make_fit_cell(found.fit.get(signal, {}).get("all"), signal),
+                    *(_format_bound(size, display) for size in bounds),
+                    display.label,
+                    make_badge(outcome.value, _TONES[outcome]),
                 )
             )
         if not fits:
-            dash, minor = Cell("–", number=True), Cell("–", number=True, secondary=True)
-            verdict = Cell(one.outcome.value, badge=True, tone=_TONES[one.outcome])
-            rows.append((*make_cells(one.name, ""), dash, dash, minor, dash, Cell(""), verdict))
-    return TableBlock(
+            verdict = make_badge(one.outcome.value, _TONES[one.outcome])
+            rows.append((one.name, "", None, None, None, None, "", verdict))
+    return make_table(
         "Errors of the predictions, of the fitted shifts, and the limit set by noise.",
-        head,
+        columns,
         rows,
     )
 
 
-def _make_bound_cell(size: float | None, display: Display, *, secondary: bool = False) -> Cell:
-    text = "–" if size is None else format_significant(size * display.factor, 3)
-    return Cell(text, number=True, secondary=secondary)
+def _format_bound(size: float | None, display: Display) -> str:
+    return "–" if size is None else format_significant(size * display.factor, 3)
 
 
-def _iterate_log_rows(held: Sequence[HeldOut]) -> Iterator[tuple[Cell, ...]]:
+def _iterate_log_rows(held: Sequence[HeldOut]) -> Iterator[tuple[object, ...]]:
     for one in held:
         for name, estimate in one.own.items():
-            display = get_display_unit(estimate.unit)
-            yield (
-                Cell(Path(one.source).name),
-                Cell(get_parameter_label(name), note=name),
-                make_value_cell(estimate, display),
-                Cell(display.label),
-                Cell(estimate.method),
-            )
+            display, file = get_display_unit(estimate.unit), Path(one.source).name
+            value = make_value_cell(estimate, display)
+            yield file, make_parameter_cell(name), value, display.label, estimate.method
 
 
 def _build_prediction_blocks(one: HeldOut, run: Validation) -> Iterator[Block]:

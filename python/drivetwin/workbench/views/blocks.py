@@ -3,19 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from dash import html
 from dash.development.base_component import Component
 
-from drivetwin.report.sections.blocks import (
+from drivetwin.report.blocks import (
     Block,
     Cell,
     FigureBlock,
     NotesBlock,
     Section,
     TableBlock,
+    TextBlock,
     Tile,
     TilesBlock,
     VerdictBlock,
@@ -39,9 +40,11 @@ def render_block(block: Block, name: str) -> Component:
             figure = make_graph(name, block.caption.partition(".")[0], block.figure)
             return html.Div([figure, make_hint(block.caption)])
         case TableBlock():
-            return _render_table(block.caption, block.head, block.rows)
+            return render_table(block)
         case NotesBlock():
             return make_notes(block.heading, block.items, block.tone.value)
+        case TextBlock():
+            return html.P(block.text)
         case TilesBlock():
             return html.Div([_render_tile(one) for one in block.tiles], className="tiles")
 
@@ -66,25 +69,34 @@ def _render_tile(tile: Tile) -> Component:
     )
 
 
-def _render_table(caption: str, head: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> Component:
+def render_table(
+    block: TableBlock, controls: tuple[str, Sequence[Component | str]] = ("", ()), name: str = ""
+) -> Component:
+    """Render a table of the class `name`; `controls` are head and rows of a further last column."""
+    title, parts = controls
     body = [
         html.Tr(
             [
                 _render_cell(row[0], html.Th, scope="row"),
                 *(_render_cell(one, html.Td) for one in row[1:]),
+                *([html.Td(parts[place])] if parts else []),
             ]
         )
-        for row in rows
+        for place, row in enumerate(block.rows)
     ]
-    top = html.Tr([_render_cell(one, html.Th, scope="col") for one in head])
-    table = html.Table([html.Caption(caption), html.Thead(top), html.Tbody(body)])
-    return html.Div(table, className="table")
+    heads = [*block.head, *([Cell(title)] if parts else [])]
+    top = html.Tr([_render_cell(one, html.Th, scope="col") for one in heads])
+    caption = [html.Caption(block.caption)] if block.caption else []
+    table = html.Table([*caption, html.Thead(top), html.Tbody(body)])
+    return html.Div(table, className=f"table {name}".strip())
 
 
 def _render_cell(cell: Cell, kind: type[html.Td] | type[html.Th], **options: Any) -> Component:
     content: list[Component | str] = [
         make_badge(cell.text, cell.tone.value) if cell.badge and cell.text else cell.text
     ]
+    if cell.href:
+        content = [html.A(cell.text, href=cell.href)]
     content += [html.Small(text) for text in (cell.note, cell.remark) if text]
     name = "number" if cell.number else "text"
     return kind(content, className=f"{name} secondary" if cell.secondary else name, **options)

@@ -3,23 +3,25 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from dash import Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
-from drivetwin._util.display_units import NM, RPM, format_significant
-from drivetwin.gearbox import Gearbox, list_builtin_gearboxes
-from drivetwin.workbench.gearboxes import (
+from drivetwin.errors import InputError
+from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, reduce, solve_gear
+from drivetwin.report.gearbox import (
     ReducedShift,
-    list_gears,
-    list_members,
-    list_shifts,
-    reduce_shift,
+    build_member_tables,
+    build_ratio_table,
+    build_reduction_blocks,
+    evaluate_reduction,
 )
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.blocks import render_block
 from drivetwin.workbench.views.fields import UploadField
 
-_ROUND_OFF = 1e-12
 _FIRST = "three-set-4000cr"
 
 
@@ -77,124 +79,45 @@ def register(page: ui.Page) -> None:
     @page.callback(
         Output("reduction", "children"), Input("gearbox-shift", "data-value"), initially=True
     )
-    def reduce(session: Session, shift: str | None) -> object:
+    def show_reduction(session: Session, shift: str | None) -> object:
         """One shift as a dual clutch."""
         box = session.gearbox
         return (
             no_update
             if box is None or shift is None
-            else _build_reduction(reduce_shift(box, shift))
+            else [
+                render_block(one, "reduction")
+                for one in build_reduction_blocks(reduce_shift(box, shift))
+            ]
         )
 
 
 def _build_content(box: Gearbox) -> list[Component]:
-    gears = list_gears(box)
-    application: list[list[ui.Content]] = [
-        [
-            one.name,
-            *(
-                html.Div("●" if e in one.elements else "", className="engaged")
-                for e in box.elements
-            ),
-            _align_right(f"{one.ratio:.4f}"),
-            _align_right(f"{one.published:.4g}"),
-            _align_right(f"{100 * one.difference:+z.2f} %"),
-        ]
-        for one in gears
-    ]
-    members: list[list[ui.Content]] = [
-        [
-            one.name,
-            _align_right(f"{one.inertia:.4g}" if one.inertia else "–"),
-            ", ".join(one.joined),
-        ]
-        for one in list_members(box)
-    ]
-    sets: list[list[ui.Content]] = [
-        [one.name, one.sun, one.ring, one.carrier, _align_right(f"{one.z:.4g}")] for one in box.sets
-    ]
+    gears = [solve_gear(box, one.name) for one in box.gears]
     shifts = {name: name for name in list_shifts(box)}
-    head = ("gear", *box.elements, "ratio", "published", "difference")
     return [
         html.H3(box.name),
         ui.make_hint(box.source),
-        ui.make_table(head, application, "Application table: ● is engaged.", "application"),
+        render_block(build_ratio_table(box, gears), "application"),
         html.H3("Reduction of a shift"),
         ui.make_row(ui.make_choice("gearbox-shift", "Shift", shifts, next(iter(shifts)))),
         html.Div(id="reduction"),
         html.H3("Members"),
-        *(
-            [ui.make_table(("set", "sun", "ring", "carrier", "z"), sets, "Planetary sets.")]
-            if sets
-            else []
-        ),
-        ui.make_table(("member", "inertia [kg·m²]", "joined by"), members),
+        *(render_block(one, "members") for one in build_member_tables(box)),
     ]
 
 
-def _build_reduction(found: ReducedShift) -> list[Component]:
-    one = found.reduction
-    elements: list[list[ui.Content]] = [
-        [
-            each.element,
-            role,
-            *(_align_right(f"{x:.4f}") for x in (each.i_c, each.i_out, each.ratio)),
-        ]
-        for role, each in (("off-going", one.off_going), ("on-coming", one.on_coming))
-    ]
-    elements += [[name, "engaged throughout", "", "", ""] for name in one.common]
-    members: list[list[ui.Content]] = [
-        [
-            each.member,
-            _align_right(f"{each.inertia:.4g}"),
-            *(_align_right(_format_number(value)) for value in (each.a, each.b, each.coupling)),
-        ]
-        for each in one.members
-    ]
-    mass: list[list[ui.Content]] = [
-        ["ω_in", _align_right(_format_number(one.M11)), _align_right(_format_number(one.M12))],
-        ["ω_out", _align_right(_format_number(one.M12)), _align_right(_format_number(one.M22))],
-    ]
-    return [
-        ui.make_hint(one.describe_condition()),
-        ui.make_table(("element", "", "i_c", "i_out", "i_c·i_out"), elements,
-              "slip = ω_in/i_c − i_out·ω_out (eq. 15)"),
-        ui.make_table(("mass matrix [kg·m²]", "ω_in", "ω_out"), mass),
-        ui.make_table(("member", "inertia [kg·m²]", "a", "b", "to M12"), members,
-              "Members that move: ω = a·ω_in − b·ω_out."),
-        _build_error_table(found),
-    ]  # fmt: skip
+def list_shifts(box: Gearbox) -> dict[str, tuple[str, str]]:
+    """Neighbouring gears (old, new) by the name of their shift, such as `2-3`."""
+    return {f"{old.name}-{new.name}": (old.name, new.name) for old, new in pairwise(box.gears)}
 
 
-def _build_error_table(found: ReducedShift) -> Component:
-    if found.reduction.exact:
-        return ui.make_hint("Nothing couples the two shafts: the reduced form is exact.")
-    if found.estimated is None or found.simulated is None:
-        return ui.make_hint(f"The error of neglecting M12 is not known: {found.reason}")
-    rows: list[list[ui.Content]] = [
-        [
-            label,
-            *(
-                _align_right(
-                    f"{format_significant(getattr(each, name) * unit.factor, 3)} {unit.label}"
-                )
-                for each in (found.estimated, found.simulated)
-            ),
-        ]
-        for label, name, unit in (
-            ("shaft torque", "shaft_torque", NM),
-            ("input speed", "input_speed", RPM),
-            ("output speed", "output_speed", RPM),
-        )
-    ]
-    caption = "Largest error over the reference shift of the card if M12 is neglected."
-    return ui.make_table(("signal", "estimated", "simulated"), rows, caption)
+def reduce_shift(box: Gearbox, shift: str) -> ReducedShift:
+    """One shift in the dual-clutch form.
 
-
-def _format_number(value: float) -> str:
-    """Format a number to four digits; round-off relative to 1 becomes zero."""
-    return "0" if abs(value) < _ROUND_OFF else f"{value:.4g}"
-
-
-def _align_right(text: str) -> Component:
-    return html.Div(text, className="number")
+    Raises InputError for a text that is no shift, ReductionError where there is no such form.
+    """
+    shifts = list_shifts(box)
+    if shift not in shifts:
+        raise InputError(f"{shift!r} is no shift", f"choose one of {', '.join(shifts)}")
+    return evaluate_reduction(reduce(box, *shifts[shift]))

@@ -5,21 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
-from typing import Any
 
 from dash import ALL, Input, State, ctx, html, set_props
 from dash.development.base_component import Component
 
-from drivetwin._util.display_units import format_uncertainty, get_display_unit
-from drivetwin.estimation.result.estimate import Z95
+from drivetwin._util.display_units import get_display_unit
 from drivetwin.parameters import get_parameter_spec
+from drivetwin.report.blocks import Cell, make_table
 from drivetwin.report.labels import get_parameter_label, get_parameter_name
-from drivetwin.report.sections.parameters import TONES
+from drivetwin.report.sections.parameters import build_parameter_table
 from drivetwin.vehicle.locks import Lock, LockKind, can_fix
 from drivetwin.workbench.locks import parse_lock
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import ControlId, get_triggered_part
 
 _KINDS = {kind.value: kind.value for kind in LockKind}
@@ -91,10 +91,23 @@ def _take_slider(work: SessionState, name: str, value: float | None) -> float | 
 
 
 def build_table(work: SessionState, names: Iterable[str]) -> Component:
-    """Build one row for each parameter: estimate, verdict and lock."""
-    head = ("parameter", "value", "± 95 %", "unit", "verdict", "lock")
-    rows = [_build_row(work, name) for name in names]
-    return ui.make_table(head, rows, name="locks")
+    """Build the table of parameters with the control of the lock of each."""
+    listed = list(names)
+    if work.method:
+        estimates = work.require_twin().parameters
+        block = build_parameter_table({name: estimates[name] for name in listed}, "")
+    else:
+        meanings = (get_parameter_spec(name).meaning for name in listed)
+        named = (
+            Cell(get_parameter_name(name), note=text)
+            for name, text in zip(listed, meanings, strict=True)
+        )
+        block = make_table("", ("parameter",), ((one,) for one in named))
+    controls = [
+        build_controls(work, name, Place.TABLE) if can_fix(name) else "follows from others"
+        for name in listed
+    ]
+    return render_table(block, ("lock", controls), "locks")
 
 
 def list_default_ids(work: SessionState) -> list[str]:
@@ -141,28 +154,6 @@ def build_controls(work: SessionState, name: str, at: Place) -> Component:
     )
     parts = [choice, number("value", "locked value", "at", value)]
     return html.Div([*parts, number("std", "standard deviation", "±", std)], className="lock")
-
-
-def _build_row(work: SessionState, name: str) -> list[Any]:
-    spec = get_parameter_spec(name)
-    display = get_display_unit(spec.unit)
-    estimate = work.require_twin().parameters[name] if work.method else None
-    value, width = "–", "–"
-    if estimate is not None and estimate.value is not None:
-        std = estimate.std_total
-        half = None if std is None else Z95 * std * display.factor
-        value, width = format_uncertainty(estimate.value * display.factor, half)
-    verdict: Any = ""
-    if estimate is not None:
-        verdict = ui.make_badge(estimate.verdict.value, TONES[estimate.verdict].value)
-    return [
-        html.Div([get_parameter_name(name), html.Small(spec.meaning)]),
-        html.Div(value, className="number"),
-        html.Div(width or "–", className="number"),
-        display.label,
-        verdict,
-        build_controls(work, name, Place.TABLE) if can_fix(name) else "follows from others",
-    ]
 
 
 def _is_same(one: Lock, other: Lock) -> bool:

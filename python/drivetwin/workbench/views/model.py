@@ -12,8 +12,8 @@ from dash.development.base_component import Component
 
 from drivetwin.errors import DrivetwinError, InputError, MissingParameterError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.estimation.result.validation import Validation
 from drivetwin.report.figures.stack import Panel
+from drivetwin.report.sections.fits import build_labelled_fits
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import can_fix
 from drivetwin.workbench.exports import Record
@@ -23,6 +23,7 @@ from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.steps import Step
 from drivetwin.workbench.views import locks, log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
 from drivetwin.workbench.views.log_choice import Place, build_log_choice
 from drivetwin.workbench.what_if import (
@@ -246,19 +247,8 @@ def _has_lock(one: Slider) -> bool:
 
 def _build_fit(live: Live, remark: str) -> list[Component]:
     """Fit of the present run, and of the one as identified."""
-    rows = [
-        (
-            name.replace("_", " "),
-            _format_percent(live.present, name),
-            _format_percent(live.identified, name),
-        )
-        for name in live.present.fit
-    ]
-    parts = [ui.make_table(("fit over the whole shift", "now", "as identified"), rows)]
+    fits = {"now": live.present.fit, "as identified": live.identified.fit}
+    parts = [render_table(build_labelled_fits(fits, "Fit by phase.", "model"))]
     status = live.present.status
     text = remark if status == "completed" else f"the simulation ended early: {status}"
     return [*parts, ui.make_hint(text)]
-
-
-def _format_percent(run: Validation, name: str) -> str:
-    return f"{run.fit[name]['all'].fit_percent:z.2f} %"

@@ -10,13 +10,13 @@ from typing import Any
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
-from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.findings import render
+from drivetwin.report.blocks import make_table
 from drivetwin.report.figures.shift_phases import build_shift_panels
 from drivetwin.report.figures.stack import Panel
-from drivetwin.report.sections.summary import describe_phases
-from drivetwin.shifts.quality import QUALITY_UNITS
-from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.report.sections.summary import build_phase_table, describe_phases
+from drivetwin.report.whole_drive import build_quality_tables
+from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.phases import (
     LABELS,
@@ -29,6 +29,7 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog, SessionState
 from drivetwin.workbench.views import log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import ControlId, Index
 from drivetwin.workbench.views.log_choice import Place, build_log_choice
 
@@ -158,15 +159,31 @@ def _build_shifts(work: SessionState) -> list[Component]:
     rejected = [text for one in work.logs for text in _list_rejected(work, one)]
     if not work.all_shifts:
         return [ui.make_notes("No usable shift", rejected, "doubtful")]
-    log = ["log"] if len(work.logs) > 1 else []
-    use = ["use"] if len(work.all_shifts) > 1 else []
-    head = ["shift", *log, "kind", "elements", "starts", "locks", *use]
-    rows = [row for at, one in enumerate(work.logs) for row in _build_rows(work, at, one)]
+    rows, uses = [], []
+    for at, one in enumerate(work.logs):
+        for k, (label, shift) in enumerate(
+            zip(make_shift_labels(one.shifts), one.shifts, strict=True)
+        ):
+            elements = f"{shift.offgoing} → {shift.oncoming}"
+            times = (shift.torque_phase[0], shift.lockup_time)
+            rows.append((label, one.source.name, shift.kind.value, elements, *times))
+            uses.append(_build_use(f"shift {label} of {one.source.name}", at, k, k in one.held))
+    columns = ("shift", "log", "kind", "elements", ("starts [s]", "z.3f"), ("locks [s]", "z.3f"))
+    table = make_table("Shifts of all logs", columns, rows)
+    several = len(rows) > 1
     return [
-        *([ui.make_hint(_HOLD_OUT)] if use else []),
-        ui.make_table(head, rows, "Shifts of all logs" if log else "Shifts of the log"),
+        *([ui.make_hint(_HOLD_OUT)] if several else []),
+        render_table(table, ("use", uses) if several else ("", ())),
         ui.make_notes("Not used", rejected, "plain"),
     ]
+
+
+def _build_use(name: str, log: int, shift: int, held: bool) -> Component:
+    """Build the choice between fit and hold-out of a shift."""
+    id: ui.Id = {"part": "use", "id": _make_use_id(log, shift)}
+    uses = {one.value: one.value for one in Use}
+    chosen = Use.HOLD_OUT if held else Use.FIT
+    return ui.make_choice(id, f"use of {name}", uses, chosen.value, hidden_label=True)
 
 
 def _list_rejected(work: SessionState, log: OpenLog) -> Iterator[str]:
@@ -175,26 +192,6 @@ def _list_rejected(work: SessionState, log: OpenLog) -> Iterator[str]:
     for one in () if log.opened.found is None else log.opened.found.rejected:
         span = f"{one.time[0]:z.2f} s to {one.time[1]:z.2f} s"
         yield f"{where}{span}: {replace_options(one.reason)}"
-
-
-def _build_rows(work: SessionState, at: int, log: OpenLog) -> Iterator[list[ui.Content]]:
-    """Yield the row of each shift of a log, with its use where there are several shifts."""
-    for k, (label, one) in enumerate(zip(make_shift_labels(log.shifts), log.shifts, strict=True)):
-        row: list[ui.Content] = [
-            label,
-            *([log.source.name] if len(work.logs) > 1 else []),
-            one.kind.value,
-            f"{one.offgoing} → {one.oncoming}",
-            f"{one.torque_phase[0]:z.3f} s",
-            f"{one.lockup_time:z.3f} s",
-        ]
-        if len(work.all_shifts) > 1:
-            name = f"use of shift {label} of {log.source.name}"
-            use = Use.HOLD_OUT if k in log.held else Use.FIT
-            id: ui.Id = {"part": "use", "id": _make_use_id(at, k)}
-            uses = {one.value: one.value for one in Use}
-            row.append(ui.make_choice(id, name, uses, use.value, hidden_label=True))
-        yield row
 
 
 def _build_other_log(work: SessionState) -> list[Component]:
@@ -239,14 +236,6 @@ def _build_content(work: SessionState) -> list[Component]:
         ),
         ui.make_hint(describe_phases(shift.kind)),
         ui.make_notes("About this shift", render(shift.findings)),
-        _build_quality(shift),
+        render_table(build_phase_table(names[str(work.shift)], shift)),
+        *map(render_table, build_quality_tables([shift])),
     ]
-
-
-def _build_quality(shift: Shift) -> Component:
-    rows = []
-    for name, value in shift.quality.items():
-        display = get_display_unit(QUALITY_UNITS[name])
-        text = f"{format_significant(value * display.factor, 3)} {display.label}"
-        rows.append((name.replace("_", " "), text))
-    return ui.make_table(("figure", "value"), rows, "Shift quality")
