@@ -39,8 +39,7 @@ from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.result.method import Method
-from drivetwin.report.html import render_report
-from drivetwin.report.together import render_joint_report
+from drivetwin.report.html import render_joint_report, render_report
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
 from drivetwin.validation.validated_model import ValidatedModel, identify_validated

@@ -10,10 +10,14 @@ import numpy as np
 
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.report.blocks import FigureBlock, TableBlock
-from drivetwin.report.comparison import render_comparison, simulate_trials
+from drivetwin.report.comparison import (
+    build_agreement_section,
+    build_trial_sections,
+    render_comparison,
+    simulate_trials,
+)
 from drivetwin.report.figures.comparison import plot_agreement, plot_trial
 from drivetwin.report.find_reports import Candidate, Trial
-from drivetwin.report.sections.comparison import build_agreement_section, build_trial_sections
 from drivetwin.report.style import get_candidate_style
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin

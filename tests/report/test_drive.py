@@ -10,8 +10,13 @@ import pytest
 
 from drivetwin.drive import DriveRun, load_powertrain, plan_launch, run
 from drivetwin.gearbox import load_gearbox
-from drivetwin.report.drive import format_traces, render_drive
-from drivetwin.report.figures.drive import plot_energy, plot_maneuver, plot_motion
+from drivetwin.report.drive import (
+    format_traces,
+    plot_energy,
+    plot_maneuver,
+    plot_motion,
+    render_drive,
+)
 
 
 @pytest.fixture(scope="module")

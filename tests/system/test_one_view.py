@@ -16,15 +16,13 @@ from drivetwin.fit.synthesize import ModelName
 from drivetwin.gearbox import load_gearbox, reduce
 from drivetwin.report.blocks import Block, Section, TableBlock
 from drivetwin.report.brief import build_identification_blocks
-from drivetwin.report.comparison import render_comparison
+from drivetwin.report.comparison import build_agreement_section, render_comparison
 from drivetwin.report.drive import build_energy_table, build_shift_table, render_drive
 from drivetwin.report.find_reports import Candidate
 from drivetwin.report.fit import build_fit_blocks, render_fit
 from drivetwin.report.gearbox import build_reduction_blocks, evaluate_reduction
-from drivetwin.report.html import render_fragment, render_page, render_report
-from drivetwin.report.sections.comparison import build_agreement_section
+from drivetwin.report.html import render_fragment, render_joint_report, render_page, render_report
 from drivetwin.report.text import format_blocks
-from drivetwin.report.together import render_joint_report
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_fit
 from drivetwin.workbench.views.blocks import render_block

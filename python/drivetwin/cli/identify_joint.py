@@ -78,7 +78,7 @@ def write_joint(outcome: Joined, folder: Path) -> tuple[Path, ...]:
     """
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.together import save_joint_report
+    from drivetwin.report.html import save_joint_report
 
     twins = list(outcome.made.twins.items())
     named = {TWIN: twins[0][1]}

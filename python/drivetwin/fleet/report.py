@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,21 +18,18 @@ from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fleet.figures import format_unit, plot_drift, plot_units
 from drivetwin.fleet.friction import compute_fleet_friction
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
+from drivetwin.fleet.mixed_model.observations import collect_facts
+from drivetwin.fleet.mixed_model.reasons import collect_output_fits
 from drivetwin.fleet.mixed_model.result import Interval, JointEstimate, Outlier
-from drivetwin.fleet.mixed_model.single_unit import (
-    MOST_ROWS,
-    build_single_logs_section,
-    make_report_link,
-    make_truncation_caption,
-)
 from drivetwin.fleet.pages import LIBRARY
-from drivetwin.fleet.rules import format_span, get_drift_unit
+from drivetwin.fleet.rules import format_reading, format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import (
     Block,
     Cell,
+    Column,
     FigureBlock,
     NotesBlock,
     Section,
@@ -386,3 +384,47 @@ def _build_settings_section(store: Store) -> Section:
         ]
         blocks.append(NotesBlock(f"Settings {settings[:12]}, {count:,} logs", lines))
     return Section("settings", "Settings and versions", "Other settings make other rows.", blocks)
+
+
+MOST_ROWS = 200
+"""Rows of a table; the store holds them all."""
+_MAKE_THEM = " 'drivetwin fleet … --reports' writes a report of each, which is linked here then."
+
+
+def build_single_logs_section(store: Store, folder: Path) -> Section:
+    """Build the table of done logs, poorest fits first; `folder` is the folder of the page."""
+    fits = collect_output_fits(store)
+    known = collect_facts(store)
+    done = [log for log, _ in store.index.iterate_done_logs() if log in known]
+    worst = sorted(done, key=lambda log: (fits.get(log, 100.0), known[log][1].path))[:MOST_ROWS]
+    fields = list(dict.fromkeys(name for log in worst for name in known[log][1].fields))
+    rows = []
+    for log in worst:
+        fact, href = known[log][1], make_report_link(store, log, folder)
+        readings = (
+            format_reading(name, fact.fields[name]) if name in fact.fields else None
+            for name in fields
+        )
+        rows.append((Cell(Path(fact.path).name, href=href), fact.unit, *readings, fits.get(log)))
+    caption = f"The poorest fit first{make_truncation_caption(len(done))}."
+    if not any(store.get_report_path(log).is_file() for log in worst):
+        caption += _MAKE_THEM
+    columns: Sequence[Column] = (
+        *("log", "unit"),
+        *((name, "s") for name in fields),
+        ("fit of the output torque, %", ".1f"),
+    )
+    blocks: list[Block] = [make_table(caption, columns, rows)] if rows else []
+    intro = "Where to look closer: how well the simulation of each log follows its measurement."
+    return Section("logs", "Log by log", intro, blocks)
+
+
+def make_report_link(store: Store, log: str, folder: Path) -> str:
+    """Return the link from a page in `folder` to the report of a log; empty without a report."""
+    report = store.get_report_path(log)
+    return Path(os.path.relpath(report, folder)).as_posix() if report.is_file() else ""
+
+
+def make_truncation_caption(count: int) -> str:
+    """Return the caption of a truncated table."""
+    return f", the first {MOST_ROWS} of {count:,}" if count > MOST_ROWS else ""

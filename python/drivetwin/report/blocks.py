@@ -15,7 +15,6 @@ from drivetwin._util.display_units import format_significant
 
 if TYPE_CHECKING:
     from drivetwin.report.figure import Figure
-    from drivetwin.report.figures.stack import Panel
     from drivetwin.shifts.shift import Shift
 
 
@@ -54,15 +53,10 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class FigureBlock:
-    """A figure with its caption.
-
-    Of a figure over time `panels` hold all samples, in the order of its first traces; the page
-    draws from them. `link` names the figures that zoom together.
-    """
+    """A figure with its caption; `link` names the figures that zoom together."""
 
     figure: Figure
     caption: str
-    panels: Sequence[Panel] = ()
     link: str = ""
     kind: str = field(default="figure", init=False)
 

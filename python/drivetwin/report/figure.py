@@ -61,6 +61,8 @@ class Figure:
     ) -> None:
         self.data: list[Entry] = [traces] if isinstance(traces, Entry) else list(traces)
         self.layout = Entry(layout)
+        self.panels: Sequence[Any] = ()
+        """Of a figure over time the panels with all samples; `data` begins with their curves."""
         self._suffixes: dict[tuple[int, int], str] = {(1, 1): ""}
 
     def set_layout(self, entries: Mapping[str, Any]) -> None:

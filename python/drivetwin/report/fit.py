@@ -119,7 +119,7 @@ def _build_figure(log: str, part: NetworkTerm, run: NetworkRun) -> FigureBlock:
         panels.append(Panel(name, _get_display(quantity), [curve], weight=0.6))
     view = (float(run.time[0]), float(run.time[-1]))
     figure = plot_over_time_axis(panels, view, _HEIGHT * len(panels))
-    return FigureBlock(figure, f"{log}.", panels)
+    return FigureBlock(figure, f"{log}.")
 
 
 def _get_display(quantity: Quantity) -> Display:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
@@ -19,6 +19,7 @@ from drivetwin._util.timed_stages import TimedStages
 from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.multi_log import Several
 from drivetwin.report.blocks import Block, FigureBlock, Section
 from drivetwin.report.embedded_data import Store, encode_content
 from drivetwin.report.figure import Entry, encode_entries
@@ -33,9 +34,16 @@ from drivetwin.report.sections.summary import (
     build_shift_section,
     build_validation_section,
 )
+from drivetwin.report.sections.together import (
+    build_holdout_section,
+    build_joint_section,
+    prefix_log_section,
+)
 
 _BELOW_BUTTONS = 30
 """Room above the panels [px] where the page has the zoom buttons outside the figure."""
+_OPENING = ("result", "findings", "logs")
+"""Sections before that of the held-out shifts."""
 PAGE = TimedStages("page", ("sections", "figures"))
 """Stages of a report."""
 
@@ -85,6 +93,60 @@ def _build_likelihood_sections(found: Identification) -> list[Section]:
     from drivetwin.report.sections.likelihood import build_likelihood_sections
 
     return build_likelihood_sections(found)
+
+
+def save_joint_report(path: Path | str, found: Identification, logs: Sequence[ShiftLog]) -> None:
+    """Write the report; the file appears whole or not at all. `logs` are those fitted, in order."""
+    write_text(path, render_joint_report(found, logs))
+
+
+def render_joint_report(found: Identification, logs: Sequence[ShiftLog]) -> str:
+    """HTML text of the report; equal inputs give equal text."""
+    several = found.evidence.several
+    held = found.evidence.held_out
+    with PAGE.enter("sections"):
+        if several is None:
+            sections = build_report_sections(found, logs[0])
+        else:
+            sections = list(_build_joint_sections(found, several, logs))
+    if held:
+        place = sum(section.anchor in _OPENING for section in sections)
+        sections.insert(place, build_holdout_section(found, held))
+    names = " and ".join(Path(log.source).name for log in logs)
+    predicted = f" · {_format_shift_count(len(held))} predicted" if held else ""
+    return render_page(
+        title=f"Driveline model from {names}",
+        subtitle=(
+            f"{_format_shift_count(len(found.shifts))} fitted{predicted} · method "
+            f"{found.method.value} · "
+            f"loss law {found.loss_law}"
+        ),
+        sections=[section for section in sections if section.blocks],
+    )
+
+
+def _format_shift_count(count: int) -> str:
+    return "1 shift" if count == 1 else f"{count} shifts"
+
+
+def _build_joint_sections(
+    found: Identification, several: Several, logs: Sequence[ShiftLog]
+) -> Iterator[Section]:
+    """The sections of all logs in reading order; stages of single shifts are in their reports."""
+    from drivetwin.estimation.multi_log.fit import extract_log
+
+    yield build_result_section(found)
+    yield build_findings_section(found.findings)
+    yield build_joint_section(found, several)
+    for share, log in zip(several.logs, logs, strict=True):
+        own = {id(shift) for shift in share.shifts}  # a log that was not simulated has no runs
+        runs = tuple(run for run in found.evidence.validation if id(run.shift) in own)
+        yield prefix_log_section(build_validation_section(runs), share)
+        yield prefix_log_section(build_shift_section(extract_log(found, share), log), share)
+    yield build_friction_section(found)
+    yield from _build_likelihood_sections(found)
+    yield build_limits_section(found)
+    yield build_provenance_section(found)
 
 
 def render_page(
@@ -164,7 +226,7 @@ def encode_figure(block: FigureBlock, store: Store) -> Markup:
     buttons = [button for menu in menus for button in menu.buttons]
     curves = [
         (store.add_time(curve.time), store.add_values(panel.display.to_display(curve.values)))
-        for panel in block.panels
+        for panel in block.figure.panels
         for curve in panel.curves
     ]
     count = len(curves)

@@ -83,8 +83,7 @@ def _run_method(task: Task, method: Method) -> Outcome | Refusal:
 
 def render_log_report(emit: Emit, found: Identification, logs: Sequence[ShiftLog]) -> None:
     """Emit the report of an identification as HTML; `logs` are those fitted, in order."""
-    from drivetwin.report.html import render_report
-    from drivetwin.report.together import render_joint_report
+    from drivetwin.report.html import render_joint_report, render_report
 
     if len(logs) == 1 and not found.evidence.held_out:
         emit(render_report(found, logs[0]))

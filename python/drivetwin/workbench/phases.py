@@ -12,7 +12,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.findings import Code, report
 from drivetwin.report.figure import Figure
-from drivetwin.report.figures.shift_phases import plot_shift_phases
+from drivetwin.report.figures.recording import plot_shift_phases
 from drivetwin.report.style import ACCENT, MUTED
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin._util.display_units import BAR, NM, RPM
-from drivetwin.report.figures.shift_phases import get_shift_spans, plot_shift_phases
+from drivetwin.report.figures.recording import get_shift_spans, plot_shift_phases
 from drivetwin.report.figures.stack import (
     Curve,
     Panel,

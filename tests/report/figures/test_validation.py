@@ -10,16 +10,15 @@ import pytest
 
 from drivetwin.estimation.result.validation import SignalTrace
 from drivetwin.report.figures.validation import (
-    build_further_panels,
-    build_overview_panels,
     build_validation_panels,
+    plot_further_signals,
     plot_overview,
 )
 from tests.report.sample import SHIFT, TIME, validation
 
 
 def test_the_overview_has_torque_and_speed_of_the_shift() -> None:
-    assert [panel.quantity for panel in build_overview_panels(validation())] == [
+    assert [panel.quantity for panel in plot_overview(validation()).panels] == [
         "output torque",
         "input speed",
     ]
@@ -30,7 +29,7 @@ def test_the_overview_has_torque_and_speed_of_the_shift() -> None:
 def test_without_an_output_torque_the_overview_has_two_speeds() -> None:
     one = validation()
     traces = {name: each for name, each in one.traces.items() if name != "output_torque"}
-    panels = build_overview_panels(replace(one, traces=traces))
+    panels = plot_overview(replace(one, traces=traces)).panels
     assert [panel.quantity for panel in panels] == ["input speed", "output speed"]
 
 
@@ -40,7 +39,9 @@ def test_measured_slip_of_a_held_element_is_zero() -> None:
     held = {"B2": np.less(TIME, start), "B3": np.greater(TIME, lockup)}
     slips = {name: np.zeros(TIME.size) for name in held}
     run = replace(one.trajectory, slip=slips)
-    panels = {panel.quantity: panel for panel in build_further_panels(replace(one, trajectory=run))}
+    panels = {
+        panel.quantity: panel for panel in plot_further_signals(replace(one, trajectory=run)).panels
+    }
     for name, inside in held.items():
         measured, simulated = panels[f"slip of {name}"].curves
         assert (measured.name, simulated.name) == ("measured", "simulated")
@@ -50,7 +51,7 @@ def test_measured_slip_of_a_held_element_is_zero() -> None:
 
 def test_signals_beyond_the_fit_have_panels_of_their_own() -> None:
     speed = SignalTrace(TIME, np.full_like(TIME, 9.0), np.full_like(TIME, 8.0), 9.0)
-    panels = build_further_panels(replace(validation(), extra_traces={"wheel_speed": speed}))
+    panels = plot_further_signals(replace(validation(), extra_traces={"wheel_speed": speed})).panels
     wheel, residual = panels[-2:]
     assert (wheel.quantity, residual.quantity) == ("wheel speed", "residual")
     assert residual.curves[0].values == pytest.approx(np.ones(TIME.size))

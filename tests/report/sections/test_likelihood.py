@@ -50,7 +50,7 @@ def test_residuals_of_a_right_model_lie_in_the_band() -> None:
     block = build_likelihood_sections(found())[0].blocks[1]
     assert isinstance(block, FigureBlock)
     means = [np.asarray(trace.y) for trace in block.figure.data if trace.name == "mean"]
-    assert len(means) == len(block.panels)
+    assert len(means) == len(block.figure.panels)
     outside = np.mean(np.abs(np.concatenate(means)) > 1.96)
     assert outside < 0.08
 

@@ -40,13 +40,10 @@ class _Band:
 
 
 def plot_profiles(found: Calibration) -> Figure:
-    """Profiles before and after, with acceleration and slip over the spread band."""
-    panels = build_profile_panels(found)
-    return plot_over_time_axis(panels, compute_full_range(panels), 820)
+    """Profiles before and after, with acceleration and slip over the spread band.
 
-
-def build_profile_panels(found: Calibration) -> list[Panel]:
-    """Return the panels of `plot_profiles` from top to bottom; time counts from the request."""
+    Time counts from the request.
+    """
     shift = found.task.maneuver
     time = shift.time - shift.request
     parts = {"before": found.before, "after": found.after}
@@ -66,12 +63,13 @@ def build_profile_panels(found: Calibration) -> list[Panel]:
         Curve(name, time, _sample(one.profiles.engine_torque, shift.time), _COLOURS[name])
         for name, one in parts.items()
     ]
-    return [
+    panels = [
         Panel("pressure", BAR, pressures, weight=1.3),
         Panel("engine torque", NM, torques, weight=0.8),
         Panel("acceleration", _ACCELERATION, _draw_bands(time, bands, 0), weight=1.3),
         Panel(f"slip of {shift.oncoming.name}", _SPEED, _draw_bands(time, bands, 1)),
     ]
+    return plot_over_time_axis(panels, compute_full_range(panels), 820)
 
 
 def plot_distributions(found: Calibration) -> Figure:

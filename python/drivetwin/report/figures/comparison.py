@@ -107,14 +107,10 @@ def plot_friction_overlay(
 
 
 def plot_trial(trial: Trial, order: Sequence[str]) -> Figure:
-    """One shift as measured and as each candidate simulates it, residuals below."""
-    panels = build_trial_panels(trial, order)
-    phases = next(iter(trial.runs.values())).phases
-    return stack_panels(panels, phases, height=140 + 170 * len(panels))
+    """One shift as measured and as each candidate simulates it, residuals below.
 
-
-def build_trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
-    """Return the panels of `plot_trial` from top to bottom; `order` lists all candidates."""
+    `order` lists all candidates.
+    """
     first = next(iter(trial.runs.values()))
     panels = []
     for name, (title, display, weight) in OUTPUTS.items():
@@ -133,7 +129,7 @@ def build_trial_panels(trial: Trial, order: Sequence[str]) -> list[Panel]:
             difference = trace.measured - trace.simulated
             left.append(Curve(candidate, trace.time, difference, style.colour, 1.0, listed=False))
         panels += [Panel(title, display, over, weight), Panel("residual", display, left, 0.7)]
-    return panels
+    return stack_panels(panels, first.phases, height=140 + 170 * len(panels))
 
 
 def plot_fit_matrix(

@@ -2,8 +2,7 @@
 """Panels over one time axis, with phase bands, a cursor through all panels and zoom by phase.
 
 A figure made here holds at most some 4000 points per curve, so that any browser draws it at once.
-The report replaces them on zoom by all samples in view, which is why sections hand over the panels
-beside the figure.
+The report replaces them on zoom by all samples in view, from the panels of the figure.
 """
 
 from __future__ import annotations
@@ -116,7 +115,9 @@ def plot_over_time_axis(
         options["updatemenus"] = [buttons]
     # Given at once: an update of the layout takes plotly as long as ten figures.
     layout = make_layout(height, hovermode="x unified", hoversubplots="axis", **options)
-    return Figure(traces, layout)
+    figure = Figure(traces, layout)
+    figure.panels = panels
+    return figure
 
 
 def compute_y_ranges(

@@ -60,38 +60,29 @@ def build_validation_panels(validation: Validation) -> list[Panel]:
 
 
 def plot_overview(validation: Validation) -> Figure:
-    """Torque and speed through the shift, simulated over measured."""
-    panels = build_overview_panels(validation)
+    """The first two signals that were compared through the shift, simulated over measured."""
+    names = [name for name in _OVERVIEW if name in validation.traces][:_OVERVIEW_PANELS]
+    panels = [
+        Panel(OUTPUTS[name][0], _scale_panel(trace, OUTPUTS[name][1]), build_pair(trace))
+        for name, trace in ((name, validation.traces[name]) for name in names)
+    ]
     view = compute_shift_view(validation.phases)
     figure = plot_over_time_axis(panels, view, height=80 + 120 * len(panels))
     mark_phases(figure, validation.phases)
     return figure
 
 
-def build_overview_panels(validation: Validation) -> list[Panel]:
-    """Return the panels of `plot_overview`: the first two signals that were compared."""
-    names = [name for name in _OVERVIEW if name in validation.traces][:_OVERVIEW_PANELS]
-    return [
-        Panel(OUTPUTS[name][0], _scale_panel(trace, OUTPUTS[name][1]), build_pair(trace))
-        for name, trace in ((name, validation.traces[name]) for name in names)
-    ]
-
-
 def plot_further_signals(validation: Validation) -> Figure:
-    """Slip of both shift elements, and the signals that are not part of the fit."""
-    panels = build_further_panels(validation)
-    height = 110 + 140 * sum(panel.weight for panel in panels)
-    return stack_panels(panels, validation.phases, height=round(height))
-
-
-def build_further_panels(validation: Validation) -> list[Panel]:
-    """Return the panels of `plot_further_signals` from top to bottom."""
+    """Slip of both shift elements, and signals that are not part of the fit; empty for none."""
     panels = list(_build_slip_panels(validation))
     for name, trace in validation.extra_traces.items():
         title, display, weight = OUTPUTS[name]
         panels.append(Panel(title, display, build_pair(trace), weight))
         panels.append(Panel("residual", display, [_build_residual(trace)], 0.5))
-    return panels
+    if not panels:
+        return Figure()
+    height = 110 + 140 * sum(panel.weight for panel in panels)
+    return stack_panels(panels, validation.phases, height=round(height))
 
 
 def _build_slip_panels(validation: Validation) -> Iterator[Panel]:

@@ -31,9 +31,11 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figures.residuals import build_residual_panels, plot_residuals
-from drivetwin.report.figures.sensitivity import plot_sensitivity
-from drivetwin.report.figures.shift_phases import get_shift_spans
+from drivetwin.report.figures.likelihood import (
+    plot_residuals,
+    plot_sensitivity,
+)
+from drivetwin.report.figures.recording import get_shift_spans
 from drivetwin.report.labels import get_channel_label
 from drivetwin.shifts.shift import make_shift_labels
 
@@ -64,7 +66,6 @@ def _build_fit_section(found: Identification, fit: LikelihoodFit) -> Section:
             FigureBlock(
                 plot_residuals(residuals, phases),
                 text,
-                build_residual_panels(residuals),
                 make_link(shift),
             )
         )

@@ -28,7 +28,7 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figures.validation import build_overview_panels, plot_overview
+from drivetwin.report.figures.validation import plot_overview
 from drivetwin.report.labels import get_estimate_label, get_estimate_name, get_parameter_label
 from drivetwin.report.model_verdict import build_verdict_block, explain_identification
 
@@ -68,9 +68,8 @@ def _build_overview(validations: Sequence[Validation]) -> FigureBlock:
     text = f"Shift {shift.start_gear}→{shift.end_gear}, measured and simulated"
     if len(validations) > 1:
         text += f": the one of {len(validations)} shifts with the lowest fit"
-    panels = build_overview_panels(shown)
     text += ". 1 gear held, 2 torque phase, 3 inertia phase, 4 new gear locked."
-    return FigureBlock(plot_overview(shown), text, panels, make_link(shift))
+    return FigureBlock(plot_overview(shown), text, make_link(shift))
 
 
 def _get_fit_percent(one: Validation) -> float:

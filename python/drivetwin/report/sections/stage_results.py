@@ -23,10 +23,13 @@ from drivetwin.report.blocks import (
     make_notes,
     make_table,
 )
-from drivetwin.report.figures.load import plot_load
-from drivetwin.report.figures.momentum import plot_momentum
-from drivetwin.report.figures.ringdown import build_ringdown_panels, plot_ringdown
-from drivetwin.report.figures.wlse import WlseLabels, plot_wlse
+from drivetwin.report.figures.stage_results import (
+    WlseLabels,
+    plot_load,
+    plot_momentum,
+    plot_ringdown,
+    plot_wlse,
+)
 from drivetwin.shifts.shift import make_shift_labels
 
 INERTIA_LABELS = WlseLabels(
@@ -217,7 +220,7 @@ def _build_ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
             else "from a decaying sine on a parabola, the engine torque's own motion included"
         )
         text = f"{one.by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, {how}."
-        blocks.append(FigureBlock(plot_ringdown(ring), text, build_ringdown_panels(ring)))
+        blocks.append(FigureBlock(plot_ringdown(ring), text))
     return blocks
 
 

@@ -22,11 +22,11 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figures.friction import plot_friction
-from drivetwin.report.figures.recording import build_log_panels, plot_log
-from drivetwin.report.figures.shift_phases import build_shift_panels, plot_shift_phases
+from drivetwin.report.figures.recording import (
+    plot_log,
+    plot_shift_phases,
+)
 from drivetwin.report.figures.validation import (
-    build_further_panels,
-    build_validation_panels,
     plot_further_signals,
     plot_validation,
 )
@@ -76,14 +76,13 @@ def build_shift_section(found: Identification, log: ShiftLog) -> Section:
     blocks: list[Block] = []
     if len(found.shifts) > 1:
         text = "The whole log; each button shows one shift of those that were used."
-        blocks.append(FigureBlock(plot_log(log, found.shifts), text, build_log_panels(log)))
+        blocks.append(FigureBlock(plot_log(log, found.shifts), text))
     for name, shift in zip(make_shift_labels(found.shifts), found.shifts, strict=True):
         title = f"Shift {name}, {shift.kind.value}. "
         blocks.append(
             FigureBlock(
                 plot_shift_phases(log, shift),
                 title + describe_phases(shift.kind),
-                build_shift_panels(log, shift),
                 make_link(shift),
             )
         )
@@ -174,13 +173,12 @@ def build_validation_section(validations: tuple[Validation, ...]) -> Section:
         blocks.append(build_fit_table(fit))
     names = make_shift_labels([one.shift for one in validations])
     for name, one in zip(names, validations, strict=True):
-        panels = build_validation_panels(one)
         text = f"Shift {name}: {_OF_SIMULATION}"
-        blocks.append(FigureBlock(plot_validation(one), text, panels, make_link(one.shift)))
-        if further := build_further_panels(one):
+        blocks.append(FigureBlock(plot_validation(one), text, make_link(one.shift)))
+        figure = plot_further_signals(one)
+        if figure.panels:
             text = f"Shift {name}: slip of the shift elements, and speeds beyond those of the fit."
-            figure = plot_further_signals(one)
-            blocks.append(FigureBlock(figure, text, further, make_link(one.shift)))
+            blocks.append(FigureBlock(figure, text, make_link(one.shift)))
         blocks.append(_build_event_table(one))
     return Section(
         "validation",

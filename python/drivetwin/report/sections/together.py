@@ -37,7 +37,7 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figures.comparison import plot_agreement
-from drivetwin.report.figures.validation import build_validation_panels, plot_validation
+from drivetwin.report.figures.validation import plot_validation
 from drivetwin.report.find_reports import Candidate, compare_estimates
 from drivetwin.report.labels import get_channel_display, get_channel_label, get_parameter_label
 from drivetwin.report.sections.fits import build_fit_table, make_fit_cell
@@ -252,7 +252,6 @@ def _build_prediction_blocks(one: HeldOut, run: Validation) -> Iterator[Block]:
         plot_validation(run),
         f"{one.name}, predicted: measured inputs, each output as measured and as predicted, "
         "and the residual below.",
-        build_validation_panels(run),
         make_link(one.shift),
     )
     yield build_fit_table(run.fit, f"Fit % and rmse of the prediction by phase, {one.name}.")

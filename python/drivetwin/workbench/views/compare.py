@@ -8,13 +8,13 @@ from dataclasses import replace
 from dash import Input, Output, html
 from dash.development.base_component import Component
 
-from drivetwin.report.comparison import simulate_trials
-from drivetwin.report.find_reports import Candidate
-from drivetwin.report.sections.comparison import (
+from drivetwin.report.comparison import (
     build_agreement_section,
     build_friction_overlay_section,
     build_trial_sections,
+    simulate_trials,
 )
+from drivetwin.report.find_reports import Candidate
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState

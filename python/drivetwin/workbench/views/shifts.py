@@ -12,7 +12,7 @@ from dash.development.base_component import Component
 
 from drivetwin.findings import render
 from drivetwin.report.blocks import make_table
-from drivetwin.report.figures.shift_phases import build_shift_panels
+from drivetwin.report.figures.recording import build_shift_panels
 from drivetwin.report.figures.stack import Panel
 from drivetwin.report.sections.summary import build_phase_table, describe_phases
 from drivetwin.report.whole_drive import build_quality_tables

@@ -8,8 +8,8 @@ import numpy as np
 from drivetwin._util.display_units import NM
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.observer.result import Band
-from drivetwin.report.figures.observer import _build_band_curves
 from drivetwin.report.figures.stack import Panel, plot_over_time_axis
+from drivetwin.report.observer import _build_band_curves
 
 
 def test_the_band_is_filled_between_its_bounds_and_named_once() -> None:

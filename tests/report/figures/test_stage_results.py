@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lock-up oscillation: fit with residual, or the extremes that were read."""
+"""Figures of the stages: grid search and lock-up oscillation."""
 
 from __future__ import annotations
 
@@ -10,10 +10,40 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.linear.ringdown import RingDown
+from drivetwin.estimation.paper.wlse import GridFit, GridRow
 from drivetwin.report.blocks import FigureBlock
 from drivetwin.report.embedded_data import Store
-from drivetwin.report.figures.ringdown import build_ringdown_panels, plot_ringdown
+from drivetwin.report.figures.stage_results import plot_ringdown, plot_wlse
 from drivetwin.report.html import encode_figure
+from drivetwin.report.sections.stage_results import INERTIA_LABELS, build_grid_table
+
+
+def _fit() -> GridFit:
+    rows = (GridRow(1.0, 23.2, 523.2), GridRow(0.85, 17.5, 273.9), GridRow(0.7, 12.6, 515.7))
+    acceleration = np.linspace(-5.0, 5.0, 50)
+    weights = np.where(np.abs(acceleration) > 1.0, 1.0, 0.01)
+    torque = 17.5 * acceleration
+    return GridFit(rows, rows[1], acceleration, torque, torque + 200.0, weights)
+
+
+def test_line_has_the_inertia_as_its_slope() -> None:
+    figure = plot_wlse(_fit(), INERTIA_LABELS)
+    line = next(trace for trace in figure.data if trace.mode == "lines")
+    assert np.ptp(line.y) / np.ptp(line.x) == pytest.approx(17.5)
+    assert "J′ = 17.5" in line.name
+
+
+def test_every_sample_is_drawn_once_at_the_best_value() -> None:
+    figure = plot_wlse(_fit(), INERTIA_LABELS)
+    start, outside, inside = figure.data[:3]
+    assert len(outside.x) + len(inside.x) == len(start.x) == 50
+
+
+def test_table_marks_the_row_of_least_error() -> None:
+    table = build_grid_table(_fit(), INERTIA_LABELS)
+    marked = [row[0].text for row in table.rows if row[3].text]
+    assert marked == ["0.85"]
+    assert [cell.text for cell in table.head[:2]] == ["η [–]", "J′ [kg·m²]"]
 
 
 def _ring() -> RingDown:
@@ -43,7 +73,7 @@ def test_the_page_packs_the_samples_and_keeps_the_extremes() -> None:
     """The samples are most of a report of many shifts; the marks stand behind them in the data."""
     read = replace(_ring(), extremes_time=np.array([0.04]), extremes_torque=np.array([1650.0]))
     store = Store()
-    block = FigureBlock(plot_ringdown(read), "", build_ringdown_panels(read))
+    block = FigureBlock(plot_ringdown(read), "")
     measured, extremes = json.loads(encode_figure(block, store))["data"]
     assert "x" not in measured
     assert "y" not in measured

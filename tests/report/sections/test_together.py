@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from drivetwin.report.together import render_joint_report
+from drivetwin.report.html import render_joint_report
 from tests.estimation.multi_log.fixtures import loaded, together
 
 

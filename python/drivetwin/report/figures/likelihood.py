@@ -1,22 +1,57 @@
 # SPDX-License-Identifier: MIT
-"""Sensitivity of each result to gain, offset and delay errors of each sensor."""
+"""Residuals of a likelihood fit over time, and sensitivity of its results to sensor errors."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from drivetwin._util.display_units import format_significant
+from drivetwin._util.display_units import Display, format_significant
+from drivetwin.estimation.likelihood.coloured_noise import compute_block_means
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     AGE,
     FRICTION,
     SIZE,
     Sensitivity,
 )
-from drivetwin.estimation.result.estimate import FloatArray
+from drivetwin.estimation.result.estimate import Z95, FloatArray
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.figure import Figure, make_subplots, make_trace
-from drivetwin.report.labels import get_channel_display, get_channel_symbol, get_parameter_label
-from drivetwin.report.style import DIVERGING, make_axis, make_layout
+from drivetwin.report.figures.stack import Curve, Panel, Phases, stack_panels
+from drivetwin.report.labels import (
+    get_channel_display,
+    get_channel_label,
+    get_channel_symbol,
+    get_parameter_label,
+)
+from drivetwin.report.style import DIVERGING, FITTED, MEASURED, make_axis, make_layout
+
+_SIGMA = Display("σ")
+
+
+def plot_residuals(
+    residuals: Mapping[str, tuple[FloatArray, FloatArray]], phases: Phases
+) -> Figure:
+    """Means of each output's residual over 20 ms blocks; of a right model 95 % lie in ±1.96 σ.
+
+    `residuals` are those of one shift, as `compute_white_residuals` gives them.
+    """
+    panels = []
+    for name, (time, white) in residuals.items():
+        middle, means = compute_block_means(time, white)
+        ends = middle[[0, -1]]
+        bounds = [
+            Curve("95 % of noise", ends, np.full(2, bound), FITTED, 1.0, "dash", listed=bound > 0.0)
+            for bound in (-Z95, Z95)
+        ]
+        panels.append(
+            Panel(
+                get_channel_label(name), _SIGMA, [Curve("mean", middle, means, MEASURED), *bounds]
+            )
+        )
+    return stack_panels(panels, phases, height=110 + 130 * len(panels))
+
 
 _KINDS = {
     "gain": f"gain + {100 * SIZE:g} %",

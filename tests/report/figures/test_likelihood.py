@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import Sensitivity
-from drivetwin.report.figures.sensitivity import plot_sensitivity
+from drivetwin.report.figures.likelihood import plot_sensitivity
 
 
 def test_a_time_is_told_in_ms_and_a_value_of_zero_in_no_per_cent() -> None:
