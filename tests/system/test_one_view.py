@@ -86,8 +86,9 @@ class Tables(HTMLParser):
         self.rows: Rows = []
         self._inside = False
 
-    def handle_starttag(self, tag: str, _: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Begin a row, a cell or a text of it."""
+        del attrs
         if tag == "tr":
             self.rows.append([])
         elif tag in ("td", "th"):
@@ -116,7 +117,10 @@ def read_page(page: str) -> Rows:
 def read_view(parts: Sequence[Component]) -> Rows:
     """Return the rows of the tables of a view of the workbench."""
     rows = [one for part in parts for one in iterate_rows(part)]
-    return [["\n".join(filter(None, iterate_texts(cell))) for cell in row.children] for row in rows]
+    return [
+        ["\n".join(filter(None, iterate_texts(cell))) for cell in getattr(row, "children", ())]
+        for row in rows
+    ]
 
 
 def iterate_rows(part: object) -> Iterator[Component]:

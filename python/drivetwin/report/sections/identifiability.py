@@ -78,7 +78,8 @@ def build_suggestion_blocks(
     suggestions: Sequence[ExperimentRanking], estimates: Mapping[str, Estimate]
 ) -> list[Block]:
     """Simulated gain of the best experiment for each parameter, and why others have none."""
-    rows, reasons = [], dict[str, list[str]]()
+    rows: list[tuple[object, ...]] = []
+    reasons: dict[str, list[str]] = {}
     for one in suggestions:
         unit, best, number = estimates[one.parameter].unit, one.best, one.best_number
         if best is None:

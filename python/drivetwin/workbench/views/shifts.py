@@ -159,7 +159,8 @@ def _build_shifts(work: SessionState) -> list[Component]:
     rejected = [text for one in work.logs for text in _list_rejected(work, one)]
     if not work.all_shifts:
         return [ui.make_notes("No usable shift", rejected, "doubtful")]
-    rows, uses = [], []
+    rows: list[tuple[object, ...]] = []
+    uses: list[Component] = []
     for at, one in enumerate(work.logs):
         for k, (label, shift) in enumerate(
             zip(make_shift_labels(one.shifts), one.shifts, strict=True)
