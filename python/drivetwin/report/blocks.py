@@ -12,9 +12,9 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from drivetwin._util.display_units import format_significant
+from drivetwin.report.figure import Figure
 
 if TYPE_CHECKING:
-    from drivetwin.report.figure import Figure
     from drivetwin.shifts.shift import Shift
 
 

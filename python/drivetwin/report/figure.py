@@ -12,9 +12,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 if TYPE_CHECKING:
+    import numpy as np
     import plotly.graph_objects as go
 
 
@@ -122,6 +121,8 @@ class Figure:
 
 def encode_entries(value: Any) -> Any:
     """Convert entries to what JSON knows: arrays packed, numbers that are not finite null."""
+    import numpy as np  # here, because commands import the blocks before they run
+
     if isinstance(value, Mapping):
         return {key: encode_entries(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
@@ -192,7 +193,7 @@ def make_subplots(
 def _divide(sizes: Sequence[float], gap: float) -> list[tuple[float, float]]:
     """Divide the length 1 into parts of relative `sizes` with a `gap` between them."""
     room = (1.0 - gap * (len(sizes) - 1)) / sum(sizes)
-    ends = np.cumsum(sizes) * room + gap * np.arange(len(sizes))
+    ends = [sum(sizes[: k + 1]) * room + gap * k for k in range(len(sizes))]
     return [(float(end - size * room), float(end)) for size, end in zip(sizes, ends, strict=True)]
 
 
