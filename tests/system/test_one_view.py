@@ -9,9 +9,9 @@ from html.parser import HTMLParser
 import pytest
 from dash import html
 from dash.development.base_component import Component
-from drivetwin.fit.holdout import predict
 
 from drivetwin.drive import load_powertrain, plan_launch, run
+from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.gearbox import load_gearbox, reduce
 from drivetwin.report.blocks import Block, Section, TableBlock
