@@ -62,7 +62,7 @@ class ShiftController:
     that goes from `inertia_pressure` to `sync_pressure`. The engine torque changes by
     `reduction_depth`, `reduction_delay` after its begin, within `reduction_time`; it returns within
     `return_time` from the slip `return_slip`, over that at its begin. A final ramp of `lock_rate`
-    [Pa/s] locks.
+    [Pa/s] locks. It begins where the slip, predicted by its present rate over `lock_lead`, ends.
     """
 
     offgoing: str
@@ -92,6 +92,7 @@ class ShiftController:
     return_slip: float
     return_time: float
     lock_rate: float
+    lock_lead: float
 
     def __post_init__(self) -> None:
         if not self.task > 0.0:

@@ -66,7 +66,7 @@ class Controller:
         self.began: tuple[float, float] | None = None
         self.locking: tuple[float, float] | None = None
         self.returning: tuple[float, float] | None = None
-        self.integral = 0.0
+        self.integral = self.left = 0.0
         self.last = of["engine_torque"], of["system_pressure"], 0.0
 
     def command(self, t: float, slips: tuple[float, float]) -> tuple[float, float, float]:
@@ -74,12 +74,15 @@ class Controller:
         after, (old, new) = t - self.of["request"] + 1e-9, slips
         if self.began is None and after > 0.03 and abs(old) > 1.5:
             self.began = t, new
+            self.left = abs(new)
         left = 0.0
         if self.began is not None:
             left = new if self.began[1] >= 0.0 else -new
             late = t - self.began[0] > 2.5 * self.of["inertia_time"]
-            if self.locking is None and (left < 0.5 or late):
+            falls = min(left - self.left, 0.0) / self.of["task"]
+            if self.locking is None and (left + falls * self.of["lock_lead"] < 0.5 or late):
                 self.locking = t, self.last[2]
+            self.left = left
         top = self.of["system_pressure"]
         pressures = (self._release(after), self._engage(t, after, left))
         off, on = (min(max(one, 0.0), top) for one in pressures)

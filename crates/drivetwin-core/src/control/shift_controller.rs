@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Slip [rad/s] of the off-going element from which the inertia phase has begun.
 const BREAKS_AWAY: f64 = 1.5;
-/// Slip [rad/s] of the on-coming element below which the final ramp begins.
+/// Predicted slip [rad/s] of the on-coming element below which the final ramp begins.
 const SYNCHRONOUS: f64 = 0.5;
 /// Least time [s] from the request to the inertia phase.
 const EARLIEST: f64 = 0.03;
@@ -76,6 +76,8 @@ pub struct ShiftController {
     pub return_time: f64,
     /// Rate of the final ramp, Pa/s.
     pub lock_rate: f64,
+    /// Time by which the slip is predicted for the begin of the final ramp, s.
+    pub lock_lead: f64,
 }
 
 /// Slips of both elements, rad/s.
@@ -123,6 +125,8 @@ pub struct ControllerState<'c> {
     given: &'c ShiftController,
     phase: Phase,
     start: InertiaStart,
+    /// Slip [rad/s] of the on-coming element at the last task, positive in the inertia phase.
+    remaining: f64,
     integral: f64,
     /// Time [s] at which the return of the engine torque began, and the torque then [N·m].
     returns: Option<(f64, f64)>,
@@ -138,7 +142,7 @@ impl<'c> ControllerState<'c> {
             oncoming: 0.0,
         };
         let start = InertiaStart { time: 0.0, slip: 0.0 };
-        Self { given, phase: Phase::Preparation, start, integral: 0.0, returns: None, last }
+        Self { given, phase: Phase::Preparation, start, remaining: 0.0, integral: 0.0, returns: None, last }
     }
 
     /// Last commands.
@@ -151,6 +155,7 @@ impl<'c> ControllerState<'c> {
         let elapsed = time - self.given.request + ROUND_OFF;
         self.change_phase(time, elapsed, slips);
         let remaining = self.start.slip.signum() * slips.oncoming;
+        self.remaining = remaining;
         let highest = self.given.system_pressure;
         self.last = Commands {
             engine_torque: self.command_torque(time, remaining),
@@ -166,9 +171,12 @@ impl<'c> ControllerState<'c> {
             && slips.offgoing.abs() > BREAKS_AWAY
         {
             self.start = InertiaStart { time, slip: slips.oncoming };
+            self.remaining = slips.oncoming.abs();
             self.phase = Phase::Inertia;
         }
-        let done = self.start.slip.signum() * slips.oncoming < SYNCHRONOUS
+        let remaining = self.start.slip.signum() * slips.oncoming;
+        let rate = (remaining - self.remaining) / self.given.task;
+        let done = remaining + rate.min(0.0) * self.given.lock_lead < SYNCHRONOUS
             || time - self.start.time > LATEST * self.given.inertia_time;
         if matches!(self.phase, Phase::Inertia) && done {
             self.phase = Phase::Locking { since: time, from: self.last.oncoming };
@@ -273,6 +281,7 @@ mod tests {
             return_slip: 0.3,
             return_time: 0.2,
             lock_rate: 50.0,
+            lock_lead: 0.0,
         }
     }
 
@@ -303,6 +312,20 @@ mod tests {
         let later = state.step(0.74, Slips { offgoing: 60.0, oncoming: 0.0 });
         assert!((later.oncoming - locking.oncoming - 2.0).abs() < 1e-6);
         near(state.step(1.00, Slips { offgoing: 60.0, oncoming: 0.0 }), [1000.0, 0.0, 10.0]);
+    }
+
+    #[test]
+    fn the_final_ramp_begins_a_lead_ahead_of_the_synchronous_slip() {
+        let given = ShiftController { lock_lead: 0.02, ..controller() };
+        let mut state = ControllerState::new(&given);
+        let at = |slip| Slips { offgoing: 60.0, oncoming: slip };
+        state.step(0.30, at(60.0));
+        state.step(0.59, at(4.0));
+        // 100 rad/s² over 20 ms leave 1 rad/s, over the next task 0.
+        state.step(0.60, at(3.0));
+        assert!(matches!(state.phase, Phase::Inertia));
+        state.step(0.61, at(2.0));
+        assert!(matches!(state.phase, Phase::Locking { .. }));
     }
 
     #[test]

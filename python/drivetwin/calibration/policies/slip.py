@@ -65,6 +65,7 @@ def build_slip_policy(
         *_list_fill_parameters(unit.oncoming, contact, system_pressure),
         *_list_torque_phase_parameters(pressures),
         *_list_inertia_parameters(pressures, _compute_slip(maneuver), task),
+        _describe_lock_lead(unit.oncoming),
         *_list_torque_parameters(abs(maneuver.point.engine_torque)),
     )
     start = {one.name: one.start for one in parameters}
@@ -150,6 +151,18 @@ def _list_inertia_parameters(
                         min(_LOCK_RATE * highest, highest / task),
                         "final ramp to system pressure"),
     )  # fmt: skip
+
+
+def _describe_lock_lead(actuator: ActuatorModel) -> PolicyParameter:
+    """Describe the prediction of the slip for the final ramp: the dead time of the actuator.
+
+    The pressure at the clutch follows a command only after it. A ramp commanded at the synchronous
+    slip would arrive late: the clutch would lock while its pressure still falls, and slip again.
+    """
+    lead = actuator.dead_time
+    return PolicyParameter("lock_lead", "s", 0.0, max(2.0 * lead, 0.01), lead,
+                           "prediction of the slip for the begin of the final ramp",
+                           free=False)  # fmt: skip
 
 
 def _list_torque_parameters(torque: float) -> tuple[PolicyParameter, ...]:
