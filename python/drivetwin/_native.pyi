@@ -72,7 +72,7 @@ def simulate_controlled(
     scenario: _Scenario,
     sets: _Sets,
     grid: _Array,
-    controlled: tuple[str, str, str],
+    controlled: str,
     into: tuple[tuple[Sequence[_Output], bool, int], _Array],
 ) -> _Ends: ...
 def batch_sensitivities(

@@ -175,5 +175,9 @@ class CompilerError(DrivetwinError):
     """A C compiler refuses the sources of an export; the text quotes it."""
 
 
+class ControllerError(DrivetwinError):
+    """The user's controller crashes, hangs or gives no finite command; the text has its inputs."""
+
+
 class InfeasibleError(DrivetwinError):
     """No calibration within the limits was found; the text names those exceeded and by how much."""

@@ -7,6 +7,7 @@ mod actuator;
 mod batch;
 mod border;
 mod controlled;
+mod external_controller;
 mod gearbox;
 mod linear;
 mod network;

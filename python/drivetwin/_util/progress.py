@@ -74,11 +74,11 @@ def scale_progress(start: float, end: float, text: str = "") -> Iterator[None]:
         _present.reset(token)
 
 
-def notify_progress(share: float) -> None:
-    """Report that `share` (0 to 1) of the current part is done."""
+def notify_progress(share: float, text: str = "") -> None:
+    """Report that `share` (0 to 1) of the current part is done, and its step if `text` is given."""
     span = _present.get()
     if span is None:
         return
     inside = min(max(share, 0.0), 1.0)
     span.highest.share = max(span.highest.share, span.start + inside * (span.end - span.start))
-    span.listener(span.highest.share, span.text)
+    span.listener(span.highest.share, text or span.text)

@@ -19,7 +19,7 @@ from drivetwin.simulation.network import Output
 from drivetwin.simulation.network_batch import NetworkScenario, to_core_scenarios
 from drivetwin.simulation.network_output import to_native
 from drivetwin.simulation.serialize import as_json
-from drivetwin.simulation.shift_control import ControlledNetwork, simulate_network_controlled
+from drivetwin.simulation.shift_control import simulate_network_controlled
 
 _CHUNK = 256
 """Runs of a batch whose columns are in memory at once."""
@@ -95,8 +95,7 @@ class Plant:
         """Simulate all controllers on all scenarios together; as `simulate` for each controller."""
         self.count.runs += len(controls) * scenarios.count
         shift = self.maneuver
-        start = shift.start
-        plant = ControlledNetwork(shift.elements, start, scenarios.units, scenarios.sets)
+        plant = shift.build_controlled(scenarios.units, scenarios.sets)
         batch = simulate_network_controlled(
             plant,
             [one.controller for one in controls],

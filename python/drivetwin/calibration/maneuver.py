@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,10 +11,19 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
-from drivetwin.simulation.driveline import Driveline, VehicleBody, build_driveline, find_body
+from drivetwin.simulation.driveline import (
+    CRANK,
+    ENGINE,
+    OUTPUT,
+    Driveline,
+    VehicleBody,
+    build_driveline,
+    find_body,
+)
 from drivetwin.simulation.driveline_start import build_start, compute_twist
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Signal, State
 from drivetwin.simulation.network import Element, Start
+from drivetwin.simulation.shift_control import ControlledNetwork, ControlledUnit
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
 
@@ -107,6 +117,13 @@ class Maneuver:
         state = replace(self.build_start(), twist=self.build_start(driveline).twist)
         held = Signal(self.time[:2], np.full(2, self.point.engine_torque))
         return build_start(driveline.model, driveline.parts, state, held, 0.0)
+
+    def build_controlled(
+        self, units: Sequence[ControlledUnit], sets: Mapping[str, FloatArray]
+    ) -> ControlledNetwork:
+        """Return made units of the nominal network, with values (units,) of numbers by path."""
+        engine = ENGINE if self.parts.front is None else CRANK
+        return ControlledNetwork(self.elements, self.start, units, sets, speeds=(engine, OUTPUT))
 
     def compute_acceleration(self, torque: float, ratio: float) -> float:
         """Steady acceleration of the output shaft [rad/s^2] at an engine torque [N m] in a gear."""

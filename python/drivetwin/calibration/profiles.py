@@ -13,9 +13,8 @@ from drivetwin.errors import SimulationError
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.shift_control import (
     INPUTS,
-    ControlledNetwork,
+    AnyController,
     ControlledUnit,
-    ShiftController,
     simulate_network_controlled,
 )
 
@@ -60,7 +59,7 @@ class Profiles:
 class ClosedLoop:
     """Controller, and the actuators of the nominal unit."""
 
-    controller: ShiftController
+    controller: AnyController
     unit: ControlledUnit
 
 
@@ -75,8 +74,7 @@ def compute_nominal_profiles(maneuver: Maneuver, control: Control) -> Profiles:
     """
     if isinstance(control, Profiles):
         return control
-    start = maneuver.start
-    plant = ControlledNetwork(maneuver.elements, start, [control.unit], {})
+    plant = maneuver.build_controlled([control.unit], {})
     batch = simulate_network_controlled(
         plant, [control.controller], maneuver.time, [maneuver.body.drive], with_inputs=True
     )

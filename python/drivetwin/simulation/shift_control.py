@@ -10,17 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from drivetwin._native import simulate_controlled as native_simulate_controlled
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import ControllerError, InputError, Where
 from drivetwin.simulation.batch import stack_sets
+from drivetwin.simulation.controller_library import load_library
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
-    CoreSamples,
-    CoreStart,
     FloatArray,
     Signal,
     run_time,
@@ -28,7 +29,6 @@ from drivetwin.simulation.dual_clutch import (
 )
 from drivetwin.simulation.network import Element, Output, Start
 from drivetwin.simulation.network_batch import NetworkScenario, resolve_native
-from drivetwin.simulation.network_output import NativeOutput
 from drivetwin.simulation.network_sensitivity import require_numbers
 from drivetwin.simulation.serialize import as_array, as_json
 
@@ -40,6 +40,9 @@ INPUTS = (
 
 A command is the one that has held until the sample.
 """
+
+_NOT_FINITE = "the controller's command is not finite"
+"""Begin of the core's reason for a run that such a command ended."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,35 @@ class ShiftController:
 
 
 @dataclass(frozen=True)
+class ExternalController:
+    """Shift controller in a library, by the interface of `drivetwin_controller.h`.
+
+    Fields as in `ShiftController`; `parameters` are the numbers that its step function reads,
+    `oil_temperature` [K] is an input of it, `library` the path of the compiled library. Pressure
+    commands stay from zero to system pressure.
+    """
+
+    offgoing: str
+    oncoming: str
+    task: float
+    request: float
+    engine_torque: float
+    system_pressure: float
+    oil_temperature: float
+    parameters: tuple[float, ...]
+    library: Path
+
+    def describe(self) -> dict[str, Any]:
+        """Return the fields that the core reads for each controller."""
+        names = ("request", "engine_torque", "system_pressure", "oil_temperature", "parameters")
+        return {name: getattr(self, name) for name in names}
+
+
+AnyController = ShiftController | ExternalController
+"""Built-in or external controller."""
+
+
+@dataclass(frozen=True)
 class ControlledUnit:
     """Actuators of a made unit, and the time constant of its engine torque [s]."""
 
@@ -140,7 +172,8 @@ class ControlledNetwork:
     """Made units of a network: actuators, and values (units,) of numbers by path.
 
     `start` is the state at the first sample. The controller commands the input `engine_torque` and
-    the pressures of its clutches; `inputs` are the others, without jumps.
+    the pressures of its clutches; `inputs` are the others, without jumps. `speeds` are the nodes of
+    engine and gearbox output, whose speeds external controllers measure.
     """
 
     elements: Sequence[Element]
@@ -149,11 +182,12 @@ class ControlledNetwork:
     parameters: Mapping[str, FloatArray]
     inputs: Mapping[str, Signal] = field(default_factory=dict)
     engine_torque: str = ENGINE_TORQUE
+    speeds: tuple[str, str] | None = None
 
 
 def simulate_network_controlled(
     plant: ControlledNetwork,
-    controllers: Sequence[ShiftController],
+    controllers: Sequence[AnyController],
     time: FloatArray,
     outputs: Sequence[Output],
     *,
@@ -186,6 +220,8 @@ def simulate_network_controlled(
     ------
     InputError
         For a path that leads to no number or an inconsistent description.
+    ControllerError
+        Where an external controller gives a command that is not finite.
     """
     sets = {name: as_array(values) for name, values in plant.parameters.items()}
     _check(sets, len(plant.units), controllers, threads)
@@ -206,66 +242,54 @@ def simulate_network_controlled(
             raise InputError(what, "give the jump a width, such as that of a sample")
     native = resolve_native(plant.elements, [scenario], outputs)
     require_numbers(plant.elements, [scenario], sets)
-    asked = _Asked(
-        as_json(list(plant.elements)),
-        plant.start.to_core(),
-        plant.units,
-        sets,
-        to_delayed_core_samples(plant.inputs),
-        plant.engine_torque,
-    )
-    return asked.simulate(controllers, time, native, with_inputs=with_inputs, threads=threads)
-
-
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """Controlled runs as the core takes them: driveline as JSON, sets (units,) by path."""
-
-    driveline: str
-    start: CoreStart
-    units: Sequence[ControlledUnit]
-    sets: Mapping[str, FloatArray]
-    samples: Sequence[CoreSamples] = ()
-    engine_torque: str = ENGINE_TORQUE
-
-    def simulate(
-        self,
-        controllers: Sequence[ShiftController],
-        time: FloatArray,
-        outputs: Sequence[NativeOutput],
-        *,
-        with_inputs: bool,
-        threads: int,
-    ) -> ControlledBatch:
-        units, rows = len(self.units), len(outputs)
-        more = len(INPUTS) if with_inputs else 0
-        values = np.empty((units, len(controllers), rows + more, len(time)))
-        given = (as_json(list(controllers)), as_json(list(self.units)), self.engine_torque)
-        try:
-            _, last_lock, failed = native_simulate_controlled(
-                self.driveline,
-                ((self.samples, []), self.start),
-                stack_sets(self.sets, units),
-                run_time(time),
-                given,
-                ((outputs, with_inputs, threads), values.reshape(-1)),
-            )
-        except ValueError as error:
-            raise InputError(str(error), "correct the model, its inputs or the names") from error
-        shape = values.shape[:2]
-        return ControlledBatch(
-            values[:, :, :rows], values[:, :, rows:], last_lock.reshape(shape), dict(failed)
+    more = len(INPUTS) if with_inputs else 0
+    values = np.empty((len(plant.units), len(controllers), len(native) + more, len(time)))
+    try:
+        _, last_lock, failed = native_simulate_controlled(
+            as_json(list(plant.elements)),
+            ((to_delayed_core_samples(plant.inputs), []), plant.start.to_core()),
+            stack_sets(sets, len(plant.units)),
+            run_time(time),
+            _describe(plant, controllers),
+            ((native, with_inputs, threads), values.reshape(-1)),
         )
+    except ValueError as error:
+        raise InputError(str(error), "correct the model, its inputs or the names") from error
+    for _, reason in failed:
+        if reason.startswith(_NOT_FINITE):
+            where = Where(file=str(getattr(controllers[0], "library", "")) or None)
+            raise ControllerError(reason, "let the step function set finite commands", where)
+    own, inputs = values[:, :, : len(native)], values[:, :, len(native) :]
+    return ControlledBatch(own, inputs, last_lock.reshape(values.shape[:2]), dict(failed))
+
+
+def _describe(plant: ControlledNetwork, controllers: Sequence[AnyController]) -> str:
+    """Return controllers, units and names as the core reads them."""
+    first = controllers[0]
+    given: Mapping[str, Any] = {"built_in": list(controllers)}
+    if isinstance(first, ExternalController):
+        of = [one.describe() for one in controllers if isinstance(one, ExternalController)]
+        given = {"external": {"library": load_library(first.library), "of": of}}
+    return as_json(
+        {
+            "controllers": given,
+            "units": list(plant.units),
+            "task": first.task,
+            "elements": [first.offgoing, first.oncoming],
+            "engine_torque": plant.engine_torque,
+            "speeds": plant.speeds,
+        }
+    )
 
 
 def _check(
     sets: Mapping[str, FloatArray],
     units: int,
-    controllers: Sequence[ShiftController],
+    controllers: Sequence[AnyController],
     threads: int,
 ) -> None:
     lengths = {len(values) for values in sets.values()} | {units}
-    common = {(one.offgoing, one.oncoming, one.task, one.request) for one in controllers}
+    common = {(type(one), one.offgoing, one.oncoming, one.task, one.request) for one in controllers}
     if len(lengths) != 1 or 0 in lengths or len(common) != 1 or threads < 0:
         raise InputError(
             f"{units} units, parameters of {sorted(lengths)} values, {len(common)} "

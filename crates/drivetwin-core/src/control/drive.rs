@@ -2,7 +2,7 @@
 //! Controller with its actuators: inputs of a driveline from slip.
 
 use super::actuator::{Actuator, ActuatorModel};
-use super::shift_controller::{Commands, ControllerState, ShiftController, Slips};
+use super::controller::{Commands, Controller, Measured, RunningController};
 use serde::{Deserialize, Serialize};
 
 /// Actuators of a made unit.
@@ -18,9 +18,8 @@ pub struct ControlledUnit {
 }
 
 /// Controller, actuators and engine in motion.
-#[derive(Clone, Debug)]
 pub struct Drive<'c> {
-    controller: ControllerState<'c>,
+    controller: Box<dyn RunningController + 'c>,
     offgoing: Actuator,
     oncoming: Actuator,
     engine_lag: f64,
@@ -30,8 +29,8 @@ pub struct Drive<'c> {
 
 impl<'c> Drive<'c> {
     /// Drive at rest before the request, from a time [s] on; `step` [s] is the usual time between two inputs.
-    pub fn new(given: &'c ShiftController, unit: &ControlledUnit, time: f64, step: f64) -> Self {
-        let controller = ControllerState::new(given);
+    pub fn new(given: &'c dyn Controller, unit: &ControlledUnit, time: f64, step: f64) -> Self {
+        let controller = given.start();
         let Commands { engine_torque, offgoing, oncoming } = controller.commands();
         Self {
             controller,
@@ -43,9 +42,9 @@ impl<'c> Drive<'c> {
         }
     }
 
-    /// Let the controller command by the slips at the present time.
-    pub fn command(&mut self, slips: Slips) -> Commands {
-        let commands = self.controller.step(self.time, slips);
+    /// Let the controller command by the quantities at the present time.
+    pub fn command(&mut self, measured: &Measured) -> Commands {
+        let commands = self.controller.step(self.time, measured);
         self.offgoing.command(commands.offgoing);
         self.oncoming.command(commands.oncoming);
         commands

@@ -5,6 +5,7 @@
 //! element slips: a PI controller keeps the slip of the on-coming element on a reference, about a feed-forward
 //! pressure. A final ramp locks it.
 
+use super::controller::{Commands, Controller, Measured, RunningController, Slips};
 use serde::{Deserialize, Serialize};
 
 /// Slip [rad/s] of the off-going element from which the inertia phase has begun.
@@ -80,26 +81,6 @@ pub struct ShiftController {
     pub lock_lead: f64,
 }
 
-/// Slips of both elements, rad/s.
-#[derive(Clone, Copy, Debug)]
-pub struct Slips {
-    /// Of the off-going element.
-    pub offgoing: f64,
-    /// Of the on-coming element.
-    pub oncoming: f64,
-}
-
-/// Commands of a task.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Commands {
-    /// N·m.
-    pub engine_torque: f64,
-    /// Pa.
-    pub offgoing: f64,
-    /// Pa.
-    pub oncoming: f64,
-}
-
 #[derive(Clone, Copy, Debug)]
 enum Phase {
     /// Filling and torque phase.
@@ -133,6 +114,22 @@ pub struct ControllerState<'c> {
     last: Commands,
 }
 
+impl Controller for ShiftController {
+    fn start(&self) -> Box<dyn RunningController + '_> {
+        Box::new(ControllerState::new(self))
+    }
+}
+
+impl RunningController for ControllerState<'_> {
+    fn commands(&self) -> Commands {
+        self.last
+    }
+
+    fn step(&mut self, time: f64, measured: &Measured) -> Commands {
+        self.command(time, measured.slips)
+    }
+}
+
 impl<'c> ControllerState<'c> {
     /// Controller before the request.
     pub fn new(given: &'c ShiftController) -> Self {
@@ -142,16 +139,19 @@ impl<'c> ControllerState<'c> {
             oncoming: 0.0,
         };
         let start = InertiaStart { time: 0.0, slip: 0.0 };
-        Self { given, phase: Phase::Preparation, start, remaining: 0.0, integral: 0.0, returns: None, last }
-    }
-
-    /// Last commands.
-    pub fn commands(&self) -> Commands {
-        self.last
+        Self {
+            given,
+            phase: Phase::Preparation,
+            start,
+            remaining: 0.0,
+            integral: 0.0,
+            returns: None,
+            last,
+        }
     }
 
     /// Commands of the task at a time [s], by the slips then.
-    pub fn step(&mut self, time: f64, slips: Slips) -> Commands {
+    pub fn command(&mut self, time: f64, slips: Slips) -> Commands {
         let elapsed = time - self.given.request + ROUND_OFF;
         self.change_phase(time, elapsed, slips);
         let remaining = self.start.slip.signum() * slips.oncoming;
@@ -297,21 +297,21 @@ mod tests {
         let given = controller();
         let mut state = ControllerState::new(&given);
         let held = Slips { offgoing: 0.0, oncoming: 60.0 };
-        near(state.step(0.09, held), [1000.0, 10.0, 0.0]);
-        near(state.step(0.10, held), [1000.0, 10.0, 3.0]);
-        near(state.step(0.20, held), [1000.0, 6.0, 3.0]);
-        near(state.step(0.25, held), [1000.0, 3.0, 5.0]);
+        near(state.command(0.09, held), [1000.0, 10.0, 0.0]);
+        near(state.command(0.10, held), [1000.0, 10.0, 3.0]);
+        near(state.command(0.20, held), [1000.0, 6.0, 3.0]);
+        near(state.command(0.25, held), [1000.0, 3.0, 5.0]);
         // The inertia phase begins: on the reference, the feed-forward alone.
-        near(state.step(0.30, Slips { offgoing: 2.0, oncoming: 60.0 }), [1000.0, 0.0, 4.0]);
+        near(state.command(0.30, Slips { offgoing: 2.0, oncoming: 60.0 }), [1000.0, 0.0, 4.0]);
         // In its middle 30 rad/s are planned.
-        near(state.step(0.50, Slips { offgoing: 30.0, oncoming: 33.0 }), [800.0, 0.0, 4.8]);
+        near(state.command(0.50, Slips { offgoing: 30.0, oncoming: 33.0 }), [800.0, 0.0, 4.8]);
         // Below 18 rad/s the engine torque returns, within 0.2 s.
-        state.step(0.60, Slips { offgoing: 45.0, oncoming: 10.0 });
-        let locking = state.step(0.70, Slips { offgoing: 60.0, oncoming: 0.0 });
+        state.command(0.60, Slips { offgoing: 45.0, oncoming: 10.0 });
+        let locking = state.command(0.70, Slips { offgoing: 60.0, oncoming: 0.0 });
         near(locking, [900.0, 0.0, state.commands().oncoming]);
-        let later = state.step(0.74, Slips { offgoing: 60.0, oncoming: 0.0 });
+        let later = state.command(0.74, Slips { offgoing: 60.0, oncoming: 0.0 });
         assert!((later.oncoming - locking.oncoming - 2.0).abs() < 1e-6);
-        near(state.step(1.00, Slips { offgoing: 60.0, oncoming: 0.0 }), [1000.0, 0.0, 10.0]);
+        near(state.command(1.00, Slips { offgoing: 60.0, oncoming: 0.0 }), [1000.0, 0.0, 10.0]);
     }
 
     #[test]
@@ -319,12 +319,12 @@ mod tests {
         let given = ShiftController { lock_lead: 0.02, ..controller() };
         let mut state = ControllerState::new(&given);
         let at = |slip| Slips { offgoing: 60.0, oncoming: slip };
-        state.step(0.30, at(60.0));
-        state.step(0.59, at(4.0));
+        state.command(0.30, at(60.0));
+        state.command(0.59, at(4.0));
         // 100 rad/s² over 20 ms leave 1 rad/s, over the next task 0.
-        state.step(0.60, at(3.0));
+        state.command(0.60, at(3.0));
         assert!(matches!(state.phase, Phase::Inertia));
-        state.step(0.61, at(2.0));
+        state.command(0.61, at(2.0));
         assert!(matches!(state.phase, Phase::Locking { .. }));
     }
 
@@ -332,8 +332,8 @@ mod tests {
     fn a_downshift_is_mirrored() {
         let given = ShiftController { direction: 1.0, engine_torque: -100.0, ..controller() };
         let mut state = ControllerState::new(&given);
-        state.step(0.30, Slips { offgoing: -2.0, oncoming: -60.0 });
-        let commands = state.step(0.50, Slips { offgoing: -30.0, oncoming: -33.0 });
+        state.command(0.30, Slips { offgoing: -2.0, oncoming: -60.0 });
+        let commands = state.command(0.50, Slips { offgoing: -30.0, oncoming: -33.0 });
         near(commands, [100.0, 0.0, 4.8]);
     }
 }

@@ -2,13 +2,13 @@
 //! Many controlled runs: parameter sets of a driveline, each with its own actuators, under several controllers.
 
 use super::batch::{Batch, Outcome, last_lock};
-use super::controlled_run::{ControlledRun, INPUTS, Places, Tasks, run_controlled};
+use super::controlled_run::{ControlledRun, INPUTS, Places, Tasks, Wiring, run_controlled};
 use super::output::Output;
 use super::run::{Plan, RunOptions, SimulateError};
 use super::sensitivity::{Scenario, SensitivityError};
 use super::sets::{ParameterSets, Sets};
 use super::threads::share_out;
-use crate::control::{ControlledUnit, ShiftController};
+use crate::control::{ControlledUnit, Controller};
 use crate::model::Driveline;
 use crate::network::Network;
 use crate::solver::{Settings, Signal, SolverCache, Status};
@@ -17,11 +17,13 @@ use crate::solver::{Settings, Signal, SolverCache, Status};
 #[derive(Clone, Copy, Debug)]
 pub struct ControlledRuns<'c> {
     /// Controllers of one task, from one request on.
-    pub controllers: &'c [ShiftController],
+    pub controllers: &'c [&'c dyn Controller],
+    /// Time between two commands, s.
+    pub task: f64,
     /// Actuators of every set.
     pub units: &'c [ControlledUnit],
-    /// Name of the input that is the engine torque.
-    pub engine_torque: &'c str,
+    /// Quantities that they command and measure.
+    pub wiring: Wiring<'c>,
     /// Parameter sets of the driveline.
     pub parameters: ParameterSets<'c>,
     /// Time grid, s.
@@ -40,7 +42,7 @@ impl ControlledRuns<'_> {
     }
 
     fn find_places(&self, network: &Network<f64>) -> Result<Places, SimulateError> {
-        Ok(Places::find(network, &self.controllers[0], self.engine_torque)?)
+        Ok(Places::find(network, &self.wiring)?)
     }
 
     /// Plan over the grid; the controlled inputs count for their knots alone.
@@ -85,7 +87,7 @@ pub fn controlled_batch(
     let sets = Sets::new(driveline, vec![&scenario.start], runs.parameters)?;
     let network = Network::compile(driveline).map_err(SimulateError::from)?;
     let plan = runs.plan(&network, &scenario.signals)?;
-    let tasks = Tasks::new(&plan.inputs, runs.controllers[0].task);
+    let tasks = Tasks::new(&plan.inputs, runs.task);
     let (size, count) = (runs.size(), runs.controllers.len());
     assert_eq!(values.len(), runs.units.len() * count * size, "places for what is kept");
     let chunks = values.chunks_exact_mut(count * size).enumerate();
@@ -128,7 +130,7 @@ fn run_set(
     let mut cache = SolverCache::new(&network);
     let unit = &runs.units[job.set];
     for (given, values) in runs.controllers.iter().zip(job.values.chunks_exact_mut(runs.size())) {
-        let run = run_controlled(&plan, tasks, places, &mut cache, &state, given, unit);
+        let run = run_controlled(&plan, tasks, places, &mut cache, &state, *given, unit);
         let ControlledRun { columns, inputs, events, status } = run;
         if status == Status::Completed {
             let kept = if runs.with_inputs { &inputs[..] } else { &[] };

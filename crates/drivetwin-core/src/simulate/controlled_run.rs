@@ -4,7 +4,7 @@
 use super::run::Plan;
 use super::start::{StartError, State, find};
 use super::trajectory::Recorder;
-use crate::control::{Commands, ControlledUnit, Drive, ShiftController, Slips};
+use crate::control::{Commands, ControlledUnit, Controller, Drive, Measured, Slips};
 use crate::model::mechanism::Normal;
 use crate::network::Network;
 use crate::network::nonlinear_torque::form;
@@ -27,6 +27,17 @@ pub(super) struct ControlledRun {
     pub status: Status,
 }
 
+/// Names of the quantities of a network that a controller commands and measures.
+#[derive(Clone, Copy, Debug)]
+pub struct Wiring<'c> {
+    /// Off-going and on-coming element.
+    pub elements: [&'c str; 2],
+    /// Input that is the engine torque.
+    pub engine_torque: &'c str,
+    /// Nodes of the engine and of the gearbox output, whose speeds are measured.
+    pub speeds: Option<[&'c str; 2]>,
+}
+
 /// Places of the controlled quantities in a network.
 #[derive(Clone, Copy)]
 pub(super) struct Places {
@@ -34,6 +45,8 @@ pub(super) struct Places {
     frictions: [usize; 2],
     /// Inputs: engine torque, off-going, on-coming.
     pub inputs: [usize; 3],
+    /// Nodes: engine, gearbox output.
+    nodes: Option<[usize; 2]>,
 }
 
 impl Tasks {
@@ -53,12 +66,8 @@ impl Tasks {
 }
 
 impl Places {
-    /// Find the elements of a controller, their pressures and the engine torque, an input of this name.
-    pub fn find(
-        network: &Network<f64>,
-        given: &ShiftController,
-        engine_torque: &str,
-    ) -> Result<Self, StartError> {
+    /// Find the elements, their pressures, the engine torque and the measured nodes.
+    pub fn find(network: &Network<f64>, wiring: &Wiring<'_>) -> Result<Self, StartError> {
         let pressed =
             network.frictions.iter().enumerate().filter_map(|(j, row)| match row.normal {
                 Normal::Pressure { input, .. } => Some((j, input, &row.element)),
@@ -66,17 +75,32 @@ impl Places {
             });
         let pressed: Vec<_> = pressed.collect();
         let clutch = |name| find("clutch", name, pressed.iter().map(|one| one.2));
-        let (off, on) = (clutch(&given.offgoing)?, clutch(&given.oncoming)?);
-        let torque = find("input", engine_torque, network.mechanism.inputs.iter())?;
+        let (off, on) = (clutch(wiring.elements[0])?, clutch(wiring.elements[1])?);
+        let torque = find("input", wiring.engine_torque, network.mechanism.inputs.iter())?;
+        let node = |name| find("node", name, network.mechanism.nodes.iter());
+        let nodes = match wiring.speeds {
+            Some([engine, output]) => Some([node(engine)?, node(output)?]),
+            None => None,
+        };
         Ok(Self {
             frictions: [pressed[off].0, pressed[on].0],
             inputs: [torque, pressed[off].1, pressed[on].1],
+            nodes,
         })
     }
 
-    fn slips(&self, network: &Network<f64>, x: &[f64]) -> Slips {
+    fn measure(&self, network: &Network<f64>, x: &[f64]) -> Measured {
         let slip = |place: usize| form(&network.frictions[self.frictions[place]].slip, x);
-        Slips { offgoing: slip(0), oncoming: slip(1) }
+        let speed = |place: usize| {
+            self.nodes.map_or(f64::NAN, |nodes| {
+                form(&network.express_in_speeds(&[(nodes[place], 1.0)]), x)
+            })
+        };
+        Measured {
+            slips: Slips { offgoing: slip(0), oncoming: slip(1) },
+            engine_speed: speed(0),
+            output_speed: speed(1),
+        }
     }
 }
 
@@ -126,7 +150,7 @@ pub(super) fn run_controlled<'n>(
     places: Places,
     known: &mut SolverCache<'n, f64>,
     start: &State<f64>,
-    given: &ShiftController,
+    given: &dyn Controller,
     unit: &ControlledUnit,
 ) -> ControlledRun {
     let network = known.network;
@@ -139,10 +163,10 @@ pub(super) fn run_controlled<'n>(
     let mut events = Vec::new();
     let mut integrate = || -> Result<(), Status> {
         let x = plan.begin(network, start);
-        let slips = trace.places.slips(network, &x);
+        let measured = trace.places.measure(network, &x);
         let (first, last) = (tasks.0[0], tasks.0[1]);
         let mut inputs = Inputs::part_of(&plan.inputs, first, last);
-        let commands = drive.command(slips);
+        let commands = command(&mut drive, begin, &measured)?;
         trace.pass_task(&mut drive, commands, first, last);
         inputs.rewrite(&plan.inputs, first, last, &trace.values);
         let cache = std::mem::replace(known, SolverCache::new(network));
@@ -161,6 +185,16 @@ pub(super) fn run_controlled<'n>(
     ControlledRun { columns, inputs: trace.grid, events, status }
 }
 
+/// Let the drive command at a task at a time [s]; fails where a command is not finite.
+fn command(drive: &mut Drive<'_>, time: f64, measured: &Measured) -> Result<Commands, Status> {
+    let commands = drive.command(measured);
+    if commands.are_finite() {
+        Ok(commands)
+    } else {
+        Err(Status::CommandNotFinite { time, measured: measured.to_string() })
+    }
+}
+
 /// Run to the end of the first task, and through all others.
 fn pass_tasks(
     run: &mut Integrator<'_, f64>,
@@ -171,7 +205,8 @@ fn pass_tasks(
 ) -> Result<(), Status> {
     recorder.run_to_end(run)?;
     for span in tasks.0.windows(2).skip(1) {
-        let commands = drive.command(trace.places.slips(run.state.network, &run.state.x));
+        let measured = trace.places.measure(run.state.network, &run.state.x);
+        let commands = command(drive, trace.plan.inputs.knot(span[0]), &measured)?;
         trace.pass_task(drive, commands, span[0], span[1]);
         run.continue_with(|inputs| {
             inputs.rewrite(&trace.plan.inputs, span[0], span[1], &trace.values);

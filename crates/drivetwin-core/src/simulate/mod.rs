@@ -22,6 +22,7 @@ mod trajectory;
 pub use batch::{Batch, Keep, Outcome, batch};
 pub use batch_sensitivity::{BatchDerivatives, Recording, batch_sensitivities};
 pub use controlled_batch::{ControlledRuns, controlled_batch};
+pub use controlled_run::Wiring;
 pub use energy_balance::EnergyAudit;
 pub use linear::{Linear, Slipping, linearise};
 pub use output::Output;

@@ -88,6 +88,13 @@ pub enum Status {
         /// Time, s.
         time: f64,
     },
+    /// A controller gave a command that is not finite.
+    CommandNotFinite {
+        /// Time of the task, s.
+        time: f64,
+        /// Quantities that the controller measured.
+        measured: String,
+    },
 }
 
 impl fmt::Display for Status {
@@ -135,6 +142,9 @@ impl fmt::Display for Status {
             Self::Interrupted { time } => write!(f, "interrupted at {time:.9} s"),
             Self::StepTooSmall { time } => write!(f, "step too small at {time:.9} s"),
             Self::NotFinite { time } => write!(f, "state not finite at {time:.9} s"),
+            Self::CommandNotFinite { time, measured } => {
+                write!(f, "the controller's command is not finite at {time:.9} s ({measured})")
+            }
         }
     }
 }

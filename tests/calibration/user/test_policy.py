@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""The user's controller in C: the built-in slip policy written in it, and faults of its code."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.calibration.closed_loop import ClosedLoop
+from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.policy import Space
+from drivetwin.calibration.scenarios import Draw, Purpose, draw_scenarios
+from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.units import UnitDraws
+from drivetwin.calibration.user import policy as user
+from drivetwin.calibration.user.guard import run_guarded
+from drivetwin.errors import ControllerError
+from drivetwin.export.compiler import compile_library
+from drivetwin.simulation.shift_control import ExternalController, ShiftController
+from tests.calibration.cases import ACTUATOR, make_draw, make_plant, make_slip_policy, make_upshift
+
+FIELDS = (
+    *("fill_pressure", "fill_time", "kiss_pressure", "torque_phase_time", "handover_pressure"),
+    *("hold_time", "hold_pressure", "release_time", "inertia_pressure", "sync_pressure"),
+    *("inertia_time", "end_slope", "gain", "integral_gain", "lock_rate", "lock_lead"),
+    *("reduction_depth", "reduction_delay", "reduction_time", "return_slip", "return_time"),
+    *("task", "direction"),
+)
+"""Parameters of slip.c in their order."""
+HEADER = Path(user.__file__).parent
+
+
+def build(folder: Path, source: str) -> Path:
+    """Compile C text against the header."""
+    path = folder / "controller.c"
+    path.write_text(source)
+    (folder / "drivetwin_controller.h").write_bytes(
+        (HEADER / "drivetwin_controller.h").read_bytes()
+    )
+    library = folder / "controller.so"
+    compile_library([path], library, None)
+    return library
+
+
+@pytest.fixture(scope="module")
+def slip_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    source = (Path(__file__).parent / "slip.c").read_text()
+    return build(tmp_path_factory.mktemp("slip"), source)
+
+
+def to_external(given: ShiftController, library: Path) -> ExternalController:
+    """Return slip.c with the parameters of a built-in controller."""
+    return ExternalController(
+        given.offgoing,
+        given.oncoming,
+        given.task,
+        given.request,
+        given.engine_torque,
+        given.system_pressure,
+        353.0,
+        tuple(getattr(given, name) for name in FIELDS),
+        library,
+    )
+
+
+def evaluate(
+    library: Path, external: bool
+) -> dict[Metric, np.ndarray[tuple[int], np.dtype[np.float64]]]:
+    shift = make_upshift()
+    policy = make_slip_policy(shift)
+    draw = Draw(make_draw(shift).driveline, UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread()))
+    draws = draw_scenarios(shift, draw, 12, 1, Purpose.SEARCH)
+    control = policy.build_control(Space(policy).to_values(Space(policy).start))
+    assert isinstance(control.controller, ShiftController)
+    if external:
+        control = ClosedLoop(to_external(control.controller, library), control.unit)
+    return dict(make_plant(shift).evaluate(control, draws).values)
+
+
+def test_slip_policy_in_c_equals_the_built_in_one(slip_library: Path) -> None:
+    built_in, external = (evaluate(slip_library, one) for one in (False, True))
+    for metric, values in built_in.items():
+        np.testing.assert_allclose(external[metric], values, rtol=1e-9, atol=1e-12)
+
+
+def test_guarded_run_returns_the_same(slip_library: Path) -> None:
+    found = run_guarded(slip_library, evaluate, slip_library, True)
+    for metric, values in evaluate(slip_library, True).items():
+        np.testing.assert_array_equal(found[metric], values)
+
+
+STEP = """#include "drivetwin_controller.h"
+#include <math.h>
+size_t dt_state_size(void) {{ return 0; }}
+void dt_step(const double *p, void *s, const dt_inputs *in, dt_commands *out) {{
+    (void)p; (void)s;
+    if (in->time > 0.3) {{ {fault} }}
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        ("*(volatile int *)0 = 1;", r"SIGSEGV.*time 0\.3.*oncoming_slip"),
+        ("for (volatile int k = 1; k;) {}", r"not returned.*time 0\.3"),
+        ("out->oncoming_pressure = NAN;", r"not finite at 0\.4.*slips"),
+    ],
+)
+def test_faults_name_the_task_and_its_inputs(
+    tmp_path: Path, fault: str, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivetwin.calibration.user.guard.LONGEST_CALL", 1.0)
+    library = build(tmp_path, STEP.format(fault=fault))
+    with pytest.raises(ControllerError, match=text):
+        run_guarded(library, evaluate, library, True)
+
+
+def test_table_parameters_keep_their_breakpoints() -> None:
+    given = user.UserController(Path("x"), (), (0.0, 1.0, 5.0, 6.0), (2, 3), 0.01, 353.0)
+    assert given.fill([7.0, 8.0]) == (0.0, 1.0, 7.0, 8.0)
+    assert replace(given, places=()).fill([]) == given.numbers
