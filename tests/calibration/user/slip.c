@@ -50,6 +50,7 @@ void dt_step(const double *numbers, void *memory, const dt_inputs *in, dt_comman
     remaining = sign(s->start_slip) * in->oncoming_slip;
     rate = (remaining - s->remaining) / p->task;
     if (s->phase == INERTIA && (remaining + (rate < 0.0 ? rate : 0.0) * p->lock_lead < 0.5
+                                || (elapsed - s->start_time > p->inertia_time && rate >= 0.0)
                                 || elapsed - s->start_time > 2.5 * p->inertia_time)) {
         s->phase = LOCKING;
         s->since = elapsed;

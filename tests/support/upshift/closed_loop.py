@@ -78,9 +78,11 @@ class Controller:
         left = 0.0
         if self.began is not None:
             left = new if self.began[1] >= 0.0 else -new
-            late = t - self.began[0] > 2.5 * self.of["inertia_time"]
-            falls = min(left - self.left, 0.0) / self.of["task"]
-            if self.locking is None and (left + falls * self.of["lock_lead"] < 0.5 or late):
+            passed, plan = t - self.began[0], self.of["inertia_time"]
+            rate = (left - self.left) / self.of["task"]
+            late = passed > 2.5 * plan or (passed > plan and rate >= 0.0)
+            ahead = left + min(rate, 0.0) * self.of["lock_lead"]
+            if self.locking is None and (ahead < 0.5 or late):
                 self.locking = t, self.last[2]
             self.left = left
         top = self.of["system_pressure"]

@@ -176,8 +176,11 @@ impl<'c> ControllerState<'c> {
         }
         let remaining = self.start.slip.signum() * slips.oncoming;
         let rate = (remaining - self.remaining) / self.given.task;
+        // The loop does not close the slip by itself where it no longer falls after the plan.
+        let passed = (time - self.start.time) / self.given.inertia_time;
         let done = remaining + rate.min(0.0) * self.given.lock_lead < SYNCHRONOUS
-            || time - self.start.time > LATEST * self.given.inertia_time;
+            || (passed > 1.0 && rate >= 0.0)
+            || passed > LATEST;
         if matches!(self.phase, Phase::Inertia) && done {
             self.phase = Phase::Locking { since: time, from: self.last.oncoming };
         }
