@@ -14,6 +14,7 @@ from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torqu
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.options import CalibrationOptions
+from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
@@ -36,6 +37,7 @@ _NOT_IDENTIFIED = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 class Request(CalibrationOptions):
     """Task of a calibration: gears and options, limits, spread between units, effort.
 
+    `controller` is that of the policy `own`.
     `start` holds starting values of the policy by name; `limits` None stands for those of the
     start.
     """
@@ -45,6 +47,7 @@ class Request(CalibrationOptions):
     spread: Spread = field(default_factory=Spread)
     start: Mapping[str, float] = field(default_factory=dict)
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
+    controller: UserController | None = None
 
 
 def build_task(twin: Twin, request: Request) -> Task:
@@ -65,7 +68,8 @@ def build_task(twin: Twin, request: Request) -> Task:
     if request.policy.commands_actuators:
         units = _build_unit_draws(twin, maneuver, request)
     unit = None if units is None else units.nominal
-    setup = PolicySetup(maneuver, _choose_pressure(twin, request), unit, request.task)
+    pressure = _choose_pressure(twin, request)
+    setup = PolicySetup(maneuver, pressure, unit, request.task, request.controller)
     policy = POLICIES[request.policy](setup).set_start(request.start)
     draw = Draw(TwinDraws(twin, shift, request.spread), units)
     task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)

@@ -6,8 +6,11 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -22,6 +25,7 @@ from drivetwin.cli.calibrate_logs import (
 )
 from drivetwin.cli.output import print_blocks, print_json, print_line, show_step, to_error_document
 from drivetwin.errors import (
+    ControllerError,
     DrivetwinError,
     IdentificationError,
     InfeasibleError,
@@ -34,6 +38,7 @@ if TYPE_CHECKING:
     from drivetwin.calibration.front import Front
     from drivetwin.calibration.learn import Correction
     from drivetwin.calibration.operating_map import Grid, OperatingMap
+    from drivetwin.calibration.policies.own import UserController
     from drivetwin.calibration.twin_task import Request
     from drivetwin.files.stages_file import StagesFile
     from drivetwin.findings import Finding
@@ -57,6 +62,9 @@ class CalibrationFiles(TwinInput):
 class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
     """Arguments of `calibrate`."""
 
+    controller: Path | None = input_file(
+        "Parameter file of your own controller in C; the policy is then own."
+    )
     start: Path | None = input_file("Earlier calibration.toml as the start.")
     effort: float = option(
         "Factor on the length of the search.", minimum=0.05, maximum=20.0, default=1.0
@@ -91,15 +99,16 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
     from drivetwin.report.calibration import build_calibration_blocks, build_correction_table
 
     model = _load_valid_twin(request.twin)
-    task, correction = _build_request(request, model)
-    model = model if correction is None else correction.twin
     output = request.output
-    stages = _open_stages(request)
-    results = _calibrate(model, task, (request.grid, request.front), stages)
-    found = results[0]
-    findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
-    with show_step(f"writing {output}"):
-        _write_results(request, results, findings, (model, task))
+    with _build_controller(request.controller) as controller:
+        task, correction = _build_request(request, model, controller)
+        model = model if correction is None else correction.twin
+        stages = _open_stages(request)
+        results = _calibrate(model, task, (request.grid, request.front), stages)
+        found = results[0]
+        findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
+        with show_step(f"writing {output}"):
+            _write_results(request, results, findings, (model, task))
     stages.remove()
     infeasible = _find_excess(found, output)
     if as_json:
@@ -128,7 +137,35 @@ def _find_excess(found: Calibration, output: Path) -> DrivetwinError | None:
     return None
 
 
-def _build_request(request: Calibrate, twin: Twin) -> tuple[Request, Correction | None]:
+@contextmanager
+def _build_controller(path: Path | None) -> Iterator[UserController | None]:
+    """Compile the controller of a parameter file for the block; None without a file.
+
+    Errors of the controller name its source.
+    """
+    if path is None:
+        yield None
+        return
+    from drivetwin.calibration.policies import own
+    from drivetwin.export.compiler import compile_library, detect_platform
+    from drivetwin.files.controller_file import build_user_controller, load_controller_file
+
+    content = load_controller_file(path)
+    source = path.parent / content.source
+    with TemporaryDirectory() as folder:
+        platform = detect_platform()
+        library = Path(folder) / f"{source.stem}{platform.suffix if platform else '.so'}"
+        with show_step(f"compiling {source.name}"):
+            compile_library([source.resolve()], library, None, headers=[own.HEADER.parent])
+        try:
+            yield build_user_controller(content, library)
+        except ControllerError as error:
+            raise replace(error, where=Where(file=str(source))) from None
+
+
+def _build_request(
+    request: Calibrate, twin: Twin, controller: UserController | None
+) -> tuple[Request, Correction | None]:
     """Build the task from options and files; correct the twin by logs if there are any."""
     from drivetwin.calibration.settings import CalibrationSettings
     from drivetwin.calibration.twin_task import Request
@@ -139,12 +176,15 @@ def _build_request(request: Calibrate, twin: Twin) -> tuple[Request, Correction 
     gears, logs = parse_gears(request.shift), request.from_logs
     correction = correct_by_logs(twin, logs, gears, given.spread) if logs else None
     settings = CalibrationSettings(certificate_draws=request.draws).scale_effort(request.effort)
+    options = request.select(CalibrationOptions)
+    options["policy"] = policy = PolicyKind.OWN if controller else request.policy
     task = Request(
-        **request.select(CalibrationOptions),
+        **options,
+        controller=controller,
         gears=gears,
         limits=given.limits or None,
         spread=given.spread,
-        start=_load_start(request.start, request.policy),
+        start=_load_start(request.start, policy),
         settings=replace(settings, starts=0) if logs and request.start else settings,
     )
     return task, correction
@@ -160,6 +200,11 @@ def _open_stages(request: Calibrate) -> StagesFile:
         f"{name} file": "" if path is None else hash_file(path)
         for name, path in request.list_files().items()
     }
+    if request.controller is not None:
+        from drivetwin.files.controller_file import load_controller_file
+
+        source = request.controller.parent / load_controller_file(request.controller).source
+        contents["controller source"] = hash_file(source)
     version = {"program version": get_program_version()}
     inputs = {**contents, **request.describe_settings(), **version}
     whole = request.output.resolve()
@@ -170,30 +215,36 @@ def _open_stages(request: Calibrate) -> StagesFile:
 def _calibrate(
     twin: Twin, request: Request, wanted: tuple[str | None, bool], stages: StagesFile
 ) -> Results:
-    """Calibrate, with the map and the front if wanted.
+    """Calibrate, with the map and the front if wanted; in a child process with a controller in C.
 
     An error removes the finished stages: they would lead to it again. An interrupt leaves them.
     """
+    from drivetwin.calibration.guarded_controller import run_guarded
+
+    arguments = (twin, request, wanted, stages)
+    try:
+        with show_step(f"calibrating {'-'.join(request.gears)} of {twin.name}"):
+            if request.controller is None:
+                return _compute(*arguments)
+            results: Results = run_guarded(request.controller.library, _compute, *arguments)
+            return results
+    except DrivetwinError:
+        stages.remove()
+        raise
+
+
+def _compute(
+    twin: Twin, request: Request, wanted: tuple[str | None, bool], stages: StagesFile
+) -> Results:
+    """Compute the calibration, with the map and the front if wanted."""
     from drivetwin.calibration.calibrate import calibrate as run_calibration
     from drivetwin.calibration.front import trace_front
     from drivetwin.calibration.twin_task import build_task
 
     grid, front = wanted
-    try:
-        with show_step(f"calibrating {'-'.join(request.gears)} of {twin.name}"):
-            mapped = None if grid is None else _calibrate_grid(twin, request, grid, stages)
-            found = (
-                run_calibration(build_task(twin, request), stages)
-                if mapped is None
-                else mapped.main
-            )
-        if not front:
-            return found, None, mapped
-        with show_step("tracing the front"):
-            return found, trace_front(found, stages), mapped
-    except DrivetwinError:
-        stages.remove()
-        raise
+    mapped = None if grid is None else _calibrate_grid(twin, request, grid, stages)
+    found = mapped.main if mapped else run_calibration(build_task(twin, request), stages)
+    return found, trace_front(found, stages) if front else None, mapped
 
 
 def _calibrate_grid(twin: Twin, request: Request, text: str, stages: StagesFile) -> OperatingMap:

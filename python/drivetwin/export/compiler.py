@@ -39,16 +39,23 @@ def detect_platform() -> Platform | None:
 
 
 def compile_library(
-    sources: Sequence[Path], target: Path, platform: Platform | None, defines: Sequence[str] = ()
+    sources: Sequence[Path],
+    target: Path,
+    platform: Platform | None,
+    defines: Sequence[str] = (),
+    headers: Sequence[Path] = (),
 ) -> None:
-    """Compile C99 sources into the shared library `target`; headers stand beside the sources.
+    """Compile C99 sources into the shared library `target`.
+
+    Headers stand beside the sources, or in the folders `headers`.
 
     `platform` None builds for this machine by the compiler found (`cc`, `gcc`, `clang`), by zig
     without one. Raises CompilerError with the compiler's words, MissingExtraError without zig.
     """
     folder = target.parent
     # Names relative to the target: whole paths would end up in some of the formats.
-    includes = sorted({relpath(path.parent, folder) for path in sources})
+    folders = {*(path.parent for path in sources), *headers}
+    includes = sorted(relpath(path, folder) for path in folders)
     windows = target.suffix == ".dll"
     command = [
         *_find_compiler(platform),

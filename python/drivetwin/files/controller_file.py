@@ -11,8 +11,8 @@ from typing import Annotated
 from pydantic import Field, FiniteFloat
 
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
-from drivetwin.calibration.profiles import PolicyParameter
-from drivetwin.calibration.user.policy import UserController
+from drivetwin.calibration.policies.own import UserController
+from drivetwin.calibration.policy import PolicyParameter
 from drivetwin.errors import InputError
 from drivetwin.files.records import Record
 

@@ -20,6 +20,7 @@ class PolicyKind(StrEnum):
     CONTROLLER = "controller", "controller parameters"
     KNOTS = "knots", "knots of the profiles"
     SLIP = "slip", "commands with a closed slip loop behind the actuators", True
+    OWN = "own", "numbers of your own controller in C", True
 
     def __new__(cls, value: str, text: str = "", commands_actuators: bool = False) -> Self:
         """Make a member of its name on the command line and the words for it."""

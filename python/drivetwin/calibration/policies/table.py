@@ -10,8 +10,10 @@ from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.knots import build_knot_policy
+from drivetwin.calibration.policies.own import UserController, build_own_policy
 from drivetwin.calibration.policies.slip import build_slip_policy
 from drivetwin.calibration.policy import Policy, Space
+from drivetwin.errors import InputError
 from drivetwin.simulation.shift_control import ControlledUnit
 
 
@@ -19,13 +21,15 @@ from drivetwin.simulation.shift_control import ControlledUnit
 class PolicySetup:
     """Shift, pressure [Pa] of a held element, nominal unit and time between two commands [s].
 
-    `unit` is None for a policy that does not command actuators.
+    `unit` is None for a policy that does not command actuators, `controller` for one that is
+    built in.
     """
 
     maneuver: Maneuver
     system_pressure: float
     unit: ControlledUnit | None
     task: float
+    controller: UserController | None = None
 
 
 def _build_controller(setup: PolicySetup) -> Policy:
@@ -44,9 +48,17 @@ def _build_slip(setup: PolicySetup) -> Policy:
     return build_slip_policy(setup.maneuver, setup.system_pressure, setup.unit, setup.task)
 
 
+def _build_own(setup: PolicySetup) -> Policy:
+    assert setup.unit is not None
+    if setup.controller is None:
+        raise InputError("the policy 'own' needs a controller", "give --controller FILE")
+    return build_own_policy(setup.maneuver, setup.system_pressure, setup.unit, setup.controller)
+
+
 POLICIES: dict[PolicyKind, Callable[[PolicySetup], Policy]] = {
     PolicyKind.CONTROLLER: _build_controller,
     PolicyKind.KNOTS: _build_knots,
     PolicyKind.SLIP: _build_slip,
+    PolicyKind.OWN: _build_own,
 }
 """Builder of each policy. Raises InputError where the system pressure cannot carry the torque."""

@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.profiles import PolicyParameter, check_parameters, move_start
+from drivetwin.calibration.policy import Policy, PolicyParameter
 from drivetwin.simulation.shift_control import ControlledUnit, ExternalController
+
+HEADER = Path(__file__).with_name("drivetwin_controller.h")
+"""Interface of the step function, for the compiler."""
 
 
 @dataclass(frozen=True)
@@ -39,34 +42,22 @@ class UserController:
 
 
 @dataclass(frozen=True)
-class UserPolicy:
-    """Controllers by the values of their parameters.
+class OwnPolicy(Policy):
+    """Controllers by the values of their parameters; `unit` are the nominal actuators."""
 
-    `unit` are the actuators of the nominal unit.
-    """
-
-    parameters: tuple[PolicyParameter, ...]
     given: UserController
     base: ExternalController
     unit: ControlledUnit
 
-    def __post_init__(self) -> None:
-        check_parameters(self.parameters)
-
-    def set_start(self, values: Mapping[str, float]) -> UserPolicy:
-        """Return the policy with other starting values by name; see `move_start`."""
-        return replace(self, parameters=move_start(self.parameters, values))
-
     def build_control(self, values: FloatArray) -> ClosedLoop:
         """Return the controller of values (p,) in the units of the parameter file."""
-        return ClosedLoop(
-            replace(self.base, parameters=self.given.fill(values.tolist())), self.unit
-        )
+        numbers = self.given.fill(values.tolist())
+        return ClosedLoop(replace(self.base, parameters=numbers), self.unit)
 
 
-def build_user_policy(
+def build_own_policy(
     maneuver: Maneuver, system_pressure: float, unit: ControlledUnit, given: UserController
-) -> UserPolicy:
+) -> OwnPolicy:
     """Return the policy of a shift; `system_pressure` [Pa] is that of a held element."""
     base = ExternalController(
         offgoing=maneuver.offgoing.name,
@@ -79,4 +70,4 @@ def build_user_policy(
         parameters=given.numbers,
         library=given.library,
     )
-    return UserPolicy(given.parameters, given, base, unit)
+    return OwnPolicy(given.parameters, given, base, unit)

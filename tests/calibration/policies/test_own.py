@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.closed_loop import ClosedLoop
+from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.policies import own
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Draw, Purpose, draw_scenarios
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
-from drivetwin.calibration.user import policy as user
-from drivetwin.calibration.user.guard import run_guarded
 from drivetwin.errors import ControllerError
 from drivetwin.export.compiler import compile_library
 from drivetwin.simulation.shift_control import ExternalController, ShiftController
@@ -30,18 +30,14 @@ FIELDS = (
     *("task", "direction"),
 )
 """Parameters of slip.c in their order."""
-HEADER = Path(user.__file__).parent
 
 
 def build(folder: Path, source: str) -> Path:
     """Compile C text against the header."""
     path = folder / "controller.c"
     path.write_text(source)
-    (folder / "drivetwin_controller.h").write_bytes(
-        (HEADER / "drivetwin_controller.h").read_bytes()
-    )
     library = folder / "controller.so"
-    compile_library([path], library, None)
+    compile_library([path], library, None, headers=[own.HEADER.parent])
     return library
 
 
@@ -113,13 +109,13 @@ void dt_step(const double *p, void *s, const dt_inputs *in, dt_commands *out) {{
 def test_faults_name_the_task_and_its_inputs(
     tmp_path: Path, fault: str, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("drivetwin.calibration.user.guard.LONGEST_CALL", 1.0)
+    monkeypatch.setattr("drivetwin.calibration.guarded_controller.LONGEST_CALL", 1.0)
     library = build(tmp_path, STEP.format(fault=fault))
     with pytest.raises(ControllerError, match=text):
         run_guarded(library, evaluate, library, True)
 
 
 def test_table_parameters_keep_their_breakpoints() -> None:
-    given = user.UserController(Path("x"), (), (0.0, 1.0, 5.0, 6.0), (2, 3), 0.01, 353.0)
+    given = own.UserController(Path("x"), (), (0.0, 1.0, 5.0, 6.0), (2, 3), 0.01, 353.0)
     assert given.fill([7.0, 8.0]) == (0.0, 1.0, 7.0, 8.0)
     assert replace(given, places=()).fill([]) == given.numbers

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Calibration of the user's own shift controller, written in C."""
