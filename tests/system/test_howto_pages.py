@@ -56,7 +56,7 @@ LONG = {
 WITHOUT_COMMANDS = ("install.md", "read-the-report.md", "workbench.md")
 FRAGMENTS = ("many-runs.md", "notebook.md", "several-logs.md")
 """Pages with code that uses names of the reader; the notebooks of the examples run it whole."""
-HOURS = ("calibrate.md",)
+HOURS = ("calibrate.md", "own-controller.md")
 """Pages whose commands search for an hour; `tests/calibration` runs shorter ones."""
 
 

@@ -8,15 +8,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field, FiniteFloat
 
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
 from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policy import PolicyParameter
+from drivetwin.channels.units import find_unit
 from drivetwin.errors import InputError
 from drivetwin.files.records import Record
 
-_CELSIUS = 273.15
 _REMEDY = "correct these entries; the how-to page on your own controller has an example"
 
 
@@ -103,7 +104,9 @@ def build_user_controller(content: ControllerFile, library: Path) -> UserControl
         places += range(len(numbers), len(numbers) + len(own))
         numbers += [each.start for each in own]
         parameters += own
-    kelvin = content.oil_temperature_C + _CELSIUS
+    celsius = find_unit("°C")
+    assert celsius is not None
+    kelvin = float(celsius.to_si(np.array(content.oil_temperature_C)))
     return UserController(
         library, tuple(parameters), tuple(numbers), tuple(places), content.task_s, kelvin
     )
