@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.calibration.closed_loop import ClosedLoop
 from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.policies import own
 from drivetwin.calibration.policy import Space
+from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.calibration.scenarios import Draw, Purpose, draw_scenarios
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
