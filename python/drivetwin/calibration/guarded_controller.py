@@ -75,6 +75,7 @@ def _end(child: SpawnProcess) -> Iterator[None]:
 def _work(pipe: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     """Send progress as pairs, then the result or the error of the function."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+    reply: tuple[Any, Exception | None]
     with attach_listener(lambda share, text: pipe.send_bytes(pickle.dumps((share, text)))):
         try:
             reply = function(*arguments), None

@@ -98,6 +98,8 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
     from drivetwin.calibration.identified_range import check_identified_range
     from drivetwin.report.calibration import build_calibration_blocks, build_correction_table
 
+    if request.controller is not None:
+        request = replace(request, policy=PolicyKind.OWN)
     model = _load_valid_twin(request.twin)
     output = request.output
     with _build_controller(request.controller) as controller:
@@ -176,15 +178,13 @@ def _build_request(
     gears, logs = parse_gears(request.shift), request.from_logs
     correction = correct_by_logs(twin, logs, gears, given.spread) if logs else None
     settings = CalibrationSettings(certificate_draws=request.draws).scale_effort(request.effort)
-    options = request.select(CalibrationOptions)
-    options["policy"] = policy = PolicyKind.OWN if controller else request.policy
     task = Request(
-        **options,
+        **request.select(CalibrationOptions),
         controller=controller,
         gears=gears,
         limits=given.limits or None,
         spread=given.spread,
-        start=_load_start(request.start, policy),
+        start=_load_start(request.start, request.policy),
         settings=replace(settings, starts=0) if logs and request.start else settings,
     )
     return task, correction

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError, Where
 
 INPUTS = (
@@ -69,8 +68,8 @@ def read_calls(library: Path) -> list[Call]:
 
 
 def _to_floats(bits: np.ndarray[tuple[int], np.dtype[np.uint64]]) -> list[float]:
-    numbers: FloatArray = bits.view(np.float64)
-    return numbers.tolist()
+    numbers: list[float] = bits.view(np.float64).tolist()
+    return numbers
 
 
 @cache
