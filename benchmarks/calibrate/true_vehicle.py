@@ -171,6 +171,7 @@ def measure_true_shift(
 def run_controlled(made: MadeVehicle, shift: Maneuver, control: ClosedLoop) -> Trajectory:
     """Simulate a shift task by task, each by a run from the start."""
     given = control.controller
+    assert isinstance(given, ShiftController), "the built-in controller is restated here"
     names = given.offgoing, given.oncoming
     controller, slips = Controller(_list_numbers(given)), (0.0, 0.0)
     count = (shift.time.size - 1) // round(given.task / _STEP)

@@ -259,8 +259,8 @@ def simulate_network_controlled(
         if reason.startswith(_NOT_FINITE):
             where = Where(file=str(getattr(controllers[0], "library", "")) or None)
             raise ControllerError(reason, "let the step function set finite commands", where)
-    own, inputs = values[:, :, : len(native)], values[:, :, len(native) :]
-    return ControlledBatch(own, inputs, last_lock.reshape(values.shape[:2]), dict(failed))
+    own, recorded = values[:, :, : len(native)], values[:, :, len(native) :]
+    return ControlledBatch(own, recorded, last_lock.reshape(values.shape[:2]), dict(failed))
 
 
 def _describe(plant: ControlledNetwork, controllers: Sequence[AnyController]) -> str:
