@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from drivetwin._util.version import get_program_version
 from drivetwin.channels.units import BAR, RPM
 from drivetwin.export.fmu.variables import ENUMERATIONS, Kind, Role, Variable
-from drivetwin.export.parameters.units import parse_base_units
+from drivetwin.export.parameters.spelling import parse_base_units
 from drivetwin.export.parameters.xml_text import format_document
 from drivetwin.export.targets import FmiVersion
 

@@ -22,8 +22,7 @@ from drivetwin.export.parameters.content import (
     format_number,
     parse_finite,
 )
-from drivetwin.export.parameters.spelling import to_dotted_name, to_one_line
-from drivetwin.export.parameters.units import parse_base_units
+from drivetwin.export.parameters.spelling import parse_base_units, to_dotted_name, to_one_line
 from drivetwin.export.parameters.xml_text import (
     add_child,
     format_comment,

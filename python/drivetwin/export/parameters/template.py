@@ -21,8 +21,12 @@ from drivetwin.channels.units import find_unit, get_time_factor, is_time_unit, l
 from drivetwin.errors import InputError, Where
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
-from drivetwin.export.parameters.spelling import parse_tool_unit, to_ascii_line, to_one_line
-from drivetwin.export.parameters.units import is_same_unit
+from drivetwin.export.parameters.spelling import (
+    is_same_unit,
+    parse_tool_unit,
+    to_ascii_line,
+    to_one_line,
+)
 from drivetwin.parameters import get_parameter_spec
 
 _QUANTITIES = {

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.export.parameters.units import parse_base_units
+from drivetwin.export.parameters.spelling import parse_base_units
 from drivetwin.parameters import SPECS
 
 
