@@ -11,6 +11,9 @@ from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolato
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.filling import FillKind, find_filling
+from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.logs.read import read_raw
+from tests.shifts.fixtures import shared
 
 STEP = 1e-3
 NOISE = 0.3
@@ -114,13 +117,55 @@ def test_names_a_filling_without_lines() -> None:
     assert found.time.size == 0
 
 
-def test_short_uneven_pieces_are_not_recognised() -> None:
-    """A limit of the method: of messages about two rows apart no straight part is left."""
+def test_names_a_filling_of_short_uneven_pieces() -> None:
+    """Of messages about two rows apart few rows lie on a line, each of them exactly."""
     rng = np.random.default_rng(4)
     knots = np.cumsum(rng.uniform(1.2e-3, 2.9e-3, 2600))
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
-    assert found is None
+    assert found is not None
+    assert found.kind is FillKind.UNKNOWN
+
+
+@pytest.mark.parametrize("others", [(0.1,), (0.02, 0.007), (0.02, 0.025, 0.05, 0.1)])
+@pytest.mark.parametrize("decimals", [1, 3, 9])
+def test_finds_samples_among_the_stamps_of_other_messages(
+    others: tuple[float, ...], decimals: int
+) -> None:
+    """A data frame on the union of all stamps, which messages of 10 ms and slower ones have."""
+    rng = np.random.default_rng(8)
+    rasters = [np.arange(0.3 * one, 5.0, one) for one in (0.01, *others)]
+    stamps = [one + 3e-4 * rng.standard_normal(one.size) for one in rasters]
+    knots = np.round(stamps[0], 6)
+    time = np.unique(np.round(np.concatenate(stamps), 6))
+    time = time[(time >= knots[0]) & (time <= knots[-1])]
+    values = np.interp(time, knots, measure_speed(knots, 8, 1.0))
+    found = find_filling(time, np.round(values, decimals))
+    assert found is not None
+    assert found.kind is FillKind.LINEAR
+    assert found.period == pytest.approx(0.01, rel=0.02)
+    nearest = np.abs(found.time[:, np.newaxis] - knots).min(axis=1)
+    assert np.mean(nearest < 1e-9) > (0.95 if decimals > 1 else 0.8)
+
+
+TRUCK = "cases/real_truck"
+
+
+@pytest.mark.parametrize("name", ["drive_0", "drive_12", "upshift_2_gear_0", "upshift_6_gear_1"])
+def test_finds_messages_in_an_export_of_a_real_bus(name: str) -> None:
+    """Speeds of a truck every 10 ms among the stamps of slower messages."""
+    path = shared(f"{TRUCK}/{name}.csv")
+    time = "Time" if "Time" in path.read_text(encoding="utf-8").partition("\n")[0] else None
+    log = read_raw(path, ReadOptions(time=TimeColumn(time, None if time is None else "s")))
+    for speed in ("TransInputShaftSpeed", "TransOutputShaftSpeed"):
+        (channel,) = log.get_channels(speed)
+        found = channel.filling
+        assert found is not None
+        assert found.kind is FillKind.LINEAR
+        assert found.period == pytest.approx(0.01, rel=0.01)
+        assert np.isin(found.time, channel.time).all()
+    (gear,) = log.get_channels("TransSelectedGear")
+    assert gear.filling is None
 
 
 @pytest.mark.parametrize("step", [0.5, 2.0])

@@ -1,37 +1,38 @@
 # SPDX-License-Identifier: MIT
-"""Least-squares fit of piecewise polynomials with evenly spaced knots to a record."""
+"""Least-squares fit of piecewise polynomials with knots on a regular raster, and its evidence."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 
-_WHOLE = 0.01
-"""Part of a sample by which a period may differ from a whole number and count as one."""
+MIN_KNOTS = 16
+"""Fewest knots that can show a raster [count]: each has a chance of a half."""
+_ROWS = 2048
+"""Rows that knots are fitted to [count]: cost of work."""
 _PHASES = 24
-"""Instants within a period at which the search for the knots begins [count]."""
-_SHORT = 2048
-"""Samples from which start and period are refined [count]."""
-_FEW = 5
-"""Instants within a period at which a cubic interpolant is tried [count]."""
-_CONTRAST = 0.9
-"""Least misfit of these relative to the largest that suggests knots."""
+"""Instants within a period at which the search for knots between rows begins [count]."""
+_WHOLE = 0.01
+"""Part of a row by which a period may differ from a whole number: the spectrum shows no more."""
 _ENDS = 4
 """Periods at each end where an interpolant depends on samples outside the record [count]."""
-ROUND_OFF = 1e-12
-"""Differences over the largest value that are round-off of an interpolation."""
-_BLOCKS = 32
+_PARTS = 32
 """Parts of a record that are compared one by one [count]."""
-_LEAST_BLOCKS = 8
-"""Parts that must bend [count]: some corners of a straight record make no raster."""
-_LEAST_SHARE = 1e-3
-"""Misfit of a part over the largest from which it counts as bent: a spline carries that of a corner
-on into the parts beside."""
+_FEW_ROWS = 5
+"""Rows between knots from which on rows show any cubic: four unknowns each [count]."""
+_KNOT_ROUNDING = 1.3
+"""Largest variance of an interpolated number for that of its rounded knots."""
+_SEARCHED = 1e-4
+"""Misfit over that half a period away which the search for the instants of knots may leave."""
+_ROUND_OFF = 1e-12
+"""Misfit over the largest value that is round-off of an interpolation."""
+_FREE = 0.1
+"""Least share of rows beyond the unknowns of a fit."""
 
 
 class Interpolant(StrEnum):
@@ -39,301 +40,324 @@ class Interpolant(StrEnum):
 
     LINEAR = "linear"
     SPLINE = "spline"  # cubic, second derivative continuous
+    HERMITE = "hermite"  # any cubic with a continuous slope
     PCHIP = "pchip"
     MAKIMA = "makima"
-    HERMITE = "hermite"  # any cubic with a continuous slope
+
+
+_FITTED = (Interpolant.LINEAR, Interpolant.SPLINE, Interpolant.HERMITE)
 
 
 @dataclass(frozen=True, eq=False)
-class KnotFit:
-    """Knots at `start` + k·`period` [s], the record's `values` (m,) there, and misfits.
-
-    `misfit` is the root mean square of record minus interpolant, `misfit_between` the same with
-    knots half a period later, and `contrast` the median of their ratio over parts of the record:
-    a few steps of a smooth signal that fall on knots leave it near one. `on_grid` where each knot
-    is a sample of the record.
-    """
+class KnotRaster:
+    """Knots at `start` + k·`period` [s], at rows of the record where `on_rows`."""
 
     start: float
     period: float
     interpolant: Interpolant
-    values: FloatArray
-    misfit: float
-    misfit_between: float
-    contrast: float
-    on_grid: bool
+    on_rows: bool
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether straight lines join the knots."""
+        return self.interpolant is Interpolant.LINEAR
 
-@dataclass(frozen=True, eq=False)
-class _Misfit:
-    """Record minus interpolant `left` (n,), NaN where none is counted; root mean square `size`."""
+    def place_knots(self, time: FloatArray, share: float = 0.0, parts: int = 1) -> FloatArray:
+        """Return the knots [s] (m,) within a record, later by a `share` of the period.
 
-    left: FloatArray
-    size: float
-
-    def compare(self, other: _Misfit, values: FloatArray) -> float:
-        """Return the median ratio of misfits over parts of the record, this one to `other`.
-
-        Parts that both reproduce, as straight ones, are no evidence; without evidence the ratio is
-        one.
+        With `parts` there are so many per period.
         """
-        ours, theirs = (
-            np.array([_compute_rms(part) for part in np.array_split(one.left, _BLOCKS)])
-            for one in (self, other)
-        )
-        least = max(ROUND_OFF * float(np.abs(values).max()), _LEAST_SHARE * float(theirs.max()))
-        bent = theirs > least
-        enough = np.count_nonzero(bent) >= _LEAST_BLOCKS
-        return float(np.median(ours[bent] / theirs[bent])) if enough else 1.0
+        start, period = self.start + share * self.period, self.period / parts
+        first = np.ceil((time[0] - start) / period - 1e-6)
+        last = np.floor((time[-1] - start) / period + 1e-6)
+        return np.asarray(start + period * np.arange(first, last + 1.0))
 
 
-def _compute_rms(values: FloatArray) -> float:
-    """Compute the root mean square of the finite `values`; 0 without any."""
-    finite = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
-
-
-def fit_on_grid(
-    time: FloatArray, values: FloatArray, period: float, interpolant: Interpolant
-) -> KnotFit | None:
-    """Fit knots that are samples of an evenly sampled record, about every `period` [s].
+def find_raster_of_knots(
+    time: FloatArray,
+    values: FloatArray,
+    periods: Sequence[float],
+    resolution: float,
+    prior: float,
+) -> KnotRaster | None:
+    """Find the raster of knots of an evenly sampled record.
 
     Parameters
     ----------
     time, values : FloatArray, shape (n,)
-        Evenly sampled record [s].
-    period : float
-        Approximate distance of knots [s].
-    interpolant : Interpolant
-        Polynomial between knots.
+        Record [s].
+    periods : Sequence of float
+        Periods to try [s], longest first.
+    resolution : float
+        Step that the values are rounded to.
+    prior : float
+        Logarithm of the odds that the evidence must exceed.
 
     Returns
     -------
-    KnotFit or None
-        None where the period is no whole number of samples, or the interpolant has as many
-        unknowns as the record has samples.
+    KnotRaster or None
+        None where no raster explains the record better than chance.
     """
     step = float(time[-1] - time[0]) / (time.size - 1)
-    samples = round(period / step)
-    if abs(period / step - samples) > _WHOLE or samples < 2:
-        return None
-    if interpolant is Interpolant.HERMITE and samples < 4:
-        return None
-    # A cubic one shows where the knots are also by lines, which are fast.
-    lines = [
-        _compute_grid_misfit(values, first, samples, Interpolant.LINEAR).size
-        for first in range(samples)
-    ]
-    firsts = np.argsort(lines)[: samples if samples < _FEW else _FEW]
-    misfits = {int(k): _compute_grid_misfit(values, int(k), samples, interpolant) for k in firsts}
-    first = min(misfits, key=lambda one: misfits[one].size)
-    between = _compute_grid_misfit(values, (first + samples // 2) % samples, samples, interpolant)
-    return KnotFit(
-        start=float(time[first]),
-        period=samples * step,
-        interpolant=interpolant,
-        values=values[first::samples],
-        misfit=misfits[first].size,
-        misfit_between=between.size,
-        contrast=misfits[first].compare(between, values),
-        on_grid=True,
-    )
+    for period in periods:
+        rows = int(max(_ROWS, 2 * _PARTS * period / step))
+        first = max((time.size - rows) // 2, 0)
+        part = slice(first, first + rows)
+        passed = [
+            raster
+            for raster, tried in _list_rasters(time[part], values[part], period, step)
+            if _weigh_raster(time[part], values[part], raster, resolution)
+            > prior + np.log(tried * len(periods))
+        ]
+        if passed:
+            return min(passed, key=lambda one: fit_knots(time[part], values[part], one).size)
+    return None
 
 
-def _compute_grid_misfit(
-    values: FloatArray, first: int, samples: int, interpolant: Interpolant
-) -> _Misfit:
-    """Compare every `samples`-th value, interpolated, with the rest of the record."""
-    index = np.arange(values.size, dtype=float)
-    if interpolant is Interpolant.HERMITE:
-        knots = index[first::samples]
-        return _fit_spline(index, values, knots, interpolant)[1]
-    at = index[first::samples]
-    low, high = int(at[min(_ENDS, at.size // 4)]), int(at[-1 - min(_ENDS, at.size // 4)])
-    inner = index[low:high]
-    between = (inner - first) % samples != 0
-    modelled = _make_interpolant(at, values[first::samples], interpolant)(inner)
-    left = np.full(values.size, np.nan)
-    left[low:high][between] = (values[low:high] - modelled)[between]
-    return _Misfit(left, float(np.sqrt(np.nanmean(left**2))))
+def _list_rasters(
+    time: FloatArray, values: FloatArray, period: float, step: float
+) -> Iterator[tuple[KnotRaster, int]]:
+    """List the best raster of each interpolant near a `period`, and how many were tried.
 
-
-def _make_interpolant(
-    at: FloatArray, values: FloatArray, interpolant: Interpolant
-) -> Callable[[FloatArray], FloatArray]:
-    if interpolant is Interpolant.LINEAR:
-        return lambda x: np.interp(x, at, values)
-    from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
-
-    if interpolant is Interpolant.SPLINE:
-        return CubicSpline(at, values)
-    # Slopes of numbers next to zero overflow on the way to a slope of zero.
-    with np.errstate(all="ignore"):
-        if interpolant is Interpolant.PCHIP:
-            return PchipInterpolator(at, values)
-        return Akima1DInterpolator(at, values, method="makima")
-
-
-def fit_off_grid(
-    time: FloatArray, values: FloatArray, period: float, interpolant: Interpolant
-) -> KnotFit | None:
-    """Fit knots between the samples of a record, about every `period` [s]; see `fit_on_grid`."""
-    if interpolant in (Interpolant.PCHIP, Interpolant.MAKIMA):
-        return None  # of the space of HERMITE
-    step = float(time[-1] - time[0]) / (time.size - 1)
-    if period < (2.4 if interpolant is Interpolant.HERMITE else 1.5) * step:
-        return None
-    raster = refine_raster(time, values, (float(time[0]), period), interpolant)
-    if raster is None:
-        return None
-    start, period = raster
-    knots = place_knots(time, start, period)
-    if knots.size < 2 * _ENDS:
-        return None
-    heights, misfit = _fit_spline(time, values, knots, interpolant)
-    _, between = _fit_spline(time, values, knots + 0.5 * period, interpolant)
-    return KnotFit(
-        start=start,
-        period=period,
-        interpolant=interpolant,
-        values=heights,
-        misfit=misfit.size,
-        misfit_between=between.size,
-        contrast=misfit.compare(between, values),
-        on_grid=False,
-    )
-
-
-def place_knots(time: FloatArray, start: float, period: float) -> FloatArray:
-    """Return the instants `start` + k·`period` [s] within a record."""
-    first = np.ceil((time[0] - start) / period - 1e-6)
-    last = np.floor((time[-1] - start) / period + 1e-6)
-    return np.asarray(start + period * np.arange(first, last + 1.0))
-
-
-def refine_raster(
-    time: FloatArray, values: FloatArray, raster: tuple[float, float], interpolant: Interpolant
-) -> tuple[float, float] | None:
-    """Search start and period [s] of knots near `raster` with the least misfit.
-
-    None where the misfit hardly depends on the start.
+    Few rows between the knots do not show any cubic, but one by a formula.
     """
-    from scipy.optimize import minimize
-
-    start, period = raster
-    short = slice(0, _SHORT // 2)
-
-    def compute_misfit(start: float, period: float, part: slice) -> float:
-        knots = place_knots(time[part], start, period)
-        if knots.size < 2 * _ENDS:
-            return np.inf
-        return _fit_spline(time[part], values[part], knots, interpolant)[1].size
-
-    starts = start + period * np.arange(_PHASES) / _PHASES
-    misfits = [compute_misfit(one, period, short) for one in starts]
-    if not min(misfits) < _CONTRAST * max(misfits):
-        return None
-    start = float(starts[int(np.argmin(misfits))])
-    parts = (slice(0, _SHORT // 4), slice(None))
-    for part in parts[time.size <= _SHORT // 4 :]:
-        length = float(time[part][-1] - time[part][0])
-        scale = np.array([0.03 * period, 0.1 * period**2 / length])
-        middle = np.array([start + period * round((0.5 * length) / period), period])
-
-        def compute(x: FloatArray, middle: FloatArray, scale: FloatArray, part: slice) -> float:
-            at, apart = middle + x * scale
-            return compute_misfit(float(at), float(apart), part)
-
-        found = minimize(
-            compute,
-            np.zeros(2),
-            (middle, scale, part),
-            method="Nelder-Mead",
-            options={"initial_simplex": [[0, 0], [1, 0], [0, 1]], "maxfev": 70, "xatol": 1e-5},
-        )
-        start, period = middle + found.x * scale
-    return float(start), float(period)
+    rows = round(period / step)
+    if abs(period / step - rows) < _WHOLE * rows and rows > 1:
+        few = (one for one in Interpolant if one is not Interpolant.HERMITE)
+        for interpolant in few if rows < _FEW_ROWS else Interpolant:
+            rasters = [KnotRaster(float(t), rows * step, interpolant, True) for t in time[:rows]]
+            # A cubic one shows where the knots are also by lines, which are fast.
+            rasters.sort(key=lambda one: _fit_lines(time, values, one, step))
+            yield _choose_raster(time, values, rasters[:_FEW_ROWS]), rows
+    short = slice(0, time.size // 2)
+    for interpolant in _FITTED if period > 2.0 * step else ():
+        starts = time[0] + period * np.arange(_PHASES) / _PHASES
+        rasters = [KnotRaster(float(one), period, interpolant, False) for one in starts]
+        raster = _choose_raster(time[short], values[short], rasters)
+        chance = float(np.log(_PHASES))
+        if _weigh_start(*_measure_parts(time[short], values[short], raster)) > chance:
+            yield _refine_raster(time, values, raster), _PHASES
 
 
-def _fit_spline(
-    time: FloatArray, values: FloatArray, knots: FloatArray, interpolant: Interpolant
-) -> tuple[FloatArray, _Misfit]:
-    """Fit a spline with these knots; return its values there and the misfit per freedom."""
+def _choose_raster(
+    time: FloatArray, values: FloatArray, rasters: Sequence[KnotRaster]
+) -> KnotRaster:
+    """Return the raster with the least misfit."""
+    return min(rasters, key=lambda one: fit_knots(time, values, one).size)
+
+
+def _fit_lines(time: FloatArray, values: FloatArray, raster: KnotRaster, step: float) -> float:
+    """Return the misfit of straight lines between the rows of a raster."""
+    first, rows = round((raster.start - time[0]) / step), round(raster.period / step)
+    at = np.arange(first, values.size, rows)
+    inner = np.arange(at[0], at[-1])
+    return _compute_rms(values[inner] - np.interp(inner, at, values[at]))
+
+
+@dataclass(frozen=True, eq=False)
+class KnotFit:
+    """Values (m,) of a record at its knots, and record minus interpolant `left` (n,).
+
+    That is NaN at the ends, and scaled to the deviation of the record; `size` is its root mean
+    square, infinite where there are as many unknowns as rows.
+    """
+
+    heights: FloatArray
+    left: FloatArray
+
+    @property
+    def size(self) -> float:
+        """Root mean square of what is left."""
+        return _compute_rms(self.left)
+
+    def list_sizes(self) -> FloatArray:
+        """Return the root mean square of each part of the record."""
+        return np.array([_compute_rms(part) for part in np.array_split(self.left, _PARTS)])
+
+
+def _compute_rms(values: FloatArray) -> float:
+    """Compute the root mean square of the numbers in `values`; infinite without any."""
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else np.inf
+
+
+def _weigh_raster(
+    time: FloatArray, values: FloatArray, raster: KnotRaster, resolution: float
+) -> float:
+    """Return the evidence of a raster in a record.
+
+    0 if it leaves more than rounding does, or if rounding explains what one half a period away
+    leaves. Without a filling each part of the record prefers either by chance. If a finer
+    interpolant explains more of most parts, the knots are not the samples.
+    """
+    mine, other = _measure_parts(time, values, raster)
+    rounding = np.sqrt((1.0 + _KNOT_ROUNDING) / 12.0) * resolution
+    usual = float(np.nanmedian(other))
+    if not np.nanmedian(mine) < max(rounding, _SEARCHED * usual) < usual:
+        return 0.0
+    if raster.interpolant in _FITTED:
+        finer = [fit_knots(time, values, raster, parts=parts) for parts in (3, 2)]
+        known = mine
+    else:
+        finer = [fit_knots(time, values, replace(raster, interpolant=Interpolant.HERMITE))]
+        known = mine / np.sqrt(1.0 + _KNOT_ROUNDING)
+    more = next((one for one in finer if one.heights.size), finer[0]).list_sizes()
+    counted = np.isfinite(mine) & np.isfinite(more)
+    if not counted.any() and raster.period > 2.5 * float(time[1] - time[0]):
+        return 0.0
+    against = int(np.count_nonzero(more[counted] < known[counted]))
+    return _weigh_start(mine, other) - _measure_odds(against, int(np.count_nonzero(counted)))
+
+
+def _measure_parts(
+    time: FloatArray, values: FloatArray, raster: KnotRaster
+) -> tuple[FloatArray, FloatArray]:
+    """Return the misfit of each part of a record with a raster, and with one half a period later.
+
+    Both are at least the round-off.
+    """
+    round_off = _ROUND_OFF * float(np.abs(values).max())
+    both = (fit_knots(time, values, raster, share=share).list_sizes() for share in (0.0, 0.5))
+    mine, other = (np.maximum(one, round_off) for one in both)
+    return mine, other
+
+
+def _weigh_start(mine: FloatArray, other: FloatArray) -> float:
+    """Return the evidence of misfits (m,) against `other` ones (m,) where they differ."""
+    counted = np.isfinite(mine) & np.isfinite(other) & (mine != other)
+    better = int(np.count_nonzero(mine[counted] < other[counted]))
+    return _measure_odds(better, int(np.count_nonzero(counted)))
+
+
+def _measure_odds(successes: int, count: int) -> float:
+    """Return minus the logarithm of the chance of so many successes, or more, of one half each."""
+    from scipy.stats import binom
+
+    return -float(binom.logsf(successes - 1, count, 0.5))
+
+
+def fit_knots(
+    time: FloatArray, values: FloatArray, raster: KnotRaster, share: float = 0.0, parts: int = 1
+) -> KnotFit:
+    """Fit a spline with the knots of a raster; see `KnotRaster.place_knots`.
+
+    The formulas of PCHIP and makima are compared with the rows between their knots.
+    """
     from scipy.interpolate import make_lsq_spline
 
-    none = _Misfit(np.full(time.size, np.nan), np.inf)
+    nothing = KnotFit(np.empty(0), np.full(time.size, np.nan))
+    knots = raster.place_knots(time, share, parts)
+    if knots.size < 2 * _ENDS + 2:
+        return nothing
+    if raster.interpolant in (Interpolant.PCHIP, Interpolant.MAKIMA):
+        return nothing if parts > 1 else _compare_between(time, values, knots, raster)
     inside = (time >= knots[0]) & (time <= knots[-1])
     x, y = time[inside], values[inside]
-    order = 1 if interpolant is Interpolant.LINEAR else 3
-    inner = np.repeat(knots[1:-1], 2 if interpolant is Interpolant.HERMITE else 1)
+    order = 1 if raster.is_linear else 3
+    inner = np.repeat(knots[1:-1], 2 if raster.interpolant is Interpolant.HERMITE else 1)
     grid = np.concatenate(([x[0]] * (order + 1), inner, [x[-1]] * (order + 1)))
+    freedom = x.size - (grid.size - order - 1)
+    if freedom < _FREE * x.size:
+        return nothing
     try:
         spline = make_lsq_spline(x, y, grid, order)
     except (ValueError, np.linalg.LinAlgError):  # a piece without samples
-        return np.empty(0), none
-    freedom = x.size - (grid.size - order - 1)
-    if freedom < 0.1 * x.size:
-        return np.empty(0), none
-    left = y - spline(x)
-    edge = _ENDS * max(int(x.size / knots.size), 1)
-    if left.size > 4 * edge:
-        left[:edge] = left[-edge:] = np.nan
-    left *= np.sqrt(x.size / freedom)
-    whole = none.left
-    whole[inside] = left
-    heights = np.asarray(spline(np.clip(knots, x[0], x[-1])))
-    return heights, _Misfit(whole, float(np.sqrt(np.nanmean(left**2))))
+        return nothing
+    left = nothing.left.copy()
+    left[inside] = (y - spline(x)) * np.sqrt(x.size / freedom)
+    left[(time < knots[_ENDS]) | (time > knots[-1 - _ENDS])] = np.nan
+    return KnotFit(np.asarray(spline(np.clip(knots, x[0], x[-1]))), left)
+
+
+def _compare_between(
+    time: FloatArray, values: FloatArray, knots: FloatArray, raster: KnotRaster
+) -> KnotFit:
+    """Compare rows with the interpolant of the rows nearest to `knots` (m,)."""
+    from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
+
+    at = np.unique(np.searchsorted(time, knots - 1e-3 * raster.period).clip(0, time.size - 1))
+    # Slopes of numbers next to zero overflow on the way to a slope of zero.
+    with np.errstate(all="ignore"):
+        if raster.interpolant is Interpolant.PCHIP:
+            left = values - PchipInterpolator(time[at], values[at])(time)
+        else:
+            left = values - Akima1DInterpolator(time[at], values[at], method="makima")(time)
+    left[at] = np.nan
+    left[(time < knots[_ENDS]) | (time > knots[-1 - _ENDS])] = np.nan
+    return KnotFit(values[at], left)
+
+
+def _refine_raster(time: FloatArray, values: FloatArray, raster: KnotRaster) -> KnotRaster:
+    """Search start and period near a raster with the least misfit, of a quarter, then of all."""
+    from scipy.optimize import minimize
+
+    interpolant = raster.interpolant
+    for part in (slice(0, time.size // 4), slice(None)):
+        length = float(time[part][-1] - time[part][0])
+        start = raster.start + raster.period * round(0.5 * length / raster.period)
+        scale = np.array([0.03 * raster.period, 0.1 * raster.period**2 / length])
+        middle = np.array([start, raster.period])
+
+        def move(
+            x: FloatArray, middle: FloatArray = middle, scale: FloatArray = scale
+        ) -> KnotRaster:
+            start, period = middle + x * scale
+            return KnotRaster(float(start), float(period), interpolant, False)
+
+        found = minimize(
+            lambda x, part=part, move=move: fit_knots(time[part], values[part], move(x)).size,
+            np.zeros(2),
+            method="Nelder-Mead",
+            options={"initial_simplex": [[0, 0], [1, 0], [0, 1]], "maxfev": 70, "xatol": 1e-5},
+        )
+        raster = move(found.x)
+    return raster
 
 
 def extend_knots(
-    time: FloatArray, values: FloatArray, fit: KnotFit
+    time: FloatArray, values: FloatArray, raster: KnotRaster
 ) -> tuple[FloatArray, FloatArray]:
     """Return instants [s] (m,) and values (m,) of the knots of a whole record.
 
-    From the window of `fit` the raster is followed both ways, as the clocks of sender and logger
+    From the window of the raster it is followed both ways, as the clocks of sender and logger
     drift apart. Stretches without enough samples have no knots; both are empty where all are such.
     """
-    reach = _ENDS * fit.period
-    length = max(_SHORT * float(np.median(np.diff(time))), 4.0 * reach)
+    reach = _ENDS * raster.period
+    length = max(_ROWS * float(np.median(np.diff(time))), 4.0 * reach)
     count = max(int((time[-1] - time[0]) / length), 1)
     borders = np.linspace(time[0], time[-1], count + 1)
     borders[-1] = np.inf
-    middle = int(np.searchsorted(borders, fit.start, side="right")) - 1
+    middle = int(np.searchsorted(borders, raster.start, side="right")) - 1
     found: dict[int, tuple[FloatArray, FloatArray]] = {}
     for way in (range(middle, count), range(middle - 1, -1, -1)):
-        start = fit.start
+        followed = raster
         for k in way:
             low, high = borders[k], borders[k + 1]
             part = slice(*np.searchsorted(time, (low - reach, high + reach)))
             if part.stop - part.start < _ENDS:
                 continue
-            start = _follow_start(time[part], values[part], start, fit)
-            knots = place_knots(time[part], start, fit.period)
-            if knots.size < 2 * _ENDS:
-                continue
-            heights, _ = _fit_spline(time[part], values[part], knots, fit.interpolant)
-            inner = (knots >= low) & (knots < high)
+            followed = _follow_raster(time[part], values[part], followed)
+            heights = fit_knots(time[part], values[part], followed).heights
             if heights.size:
+                knots = followed.place_knots(time[part])
+                inner = (knots >= low) & (knots < high)
                 found[k] = knots[inner], heights[inner]
     parts = [found[k] for k in sorted(found)] or [(np.empty(0), np.empty(0))]
     return np.concatenate([at for at, _ in parts]), np.concatenate([one for _, one in parts])
 
 
-def _follow_start(time: FloatArray, values: FloatArray, start: float, fit: KnotFit) -> float:
-    """Return the instant of a knot near which the raster `start` + k·period fits best."""
+def _follow_raster(time: FloatArray, values: FloatArray, raster: KnotRaster) -> KnotRaster:
+    """Return the raster with the start near its own that fits a stretch best."""
     from scipy.optimize import minimize_scalar
 
-    base = start + fit.period * np.round((time[0] - start) / fit.period)
+    def move(late: float) -> KnotRaster:
+        return KnotRaster(raster.start + late, raster.period, raster.interpolant, False)
 
-    def compute_misfit(late: float) -> float:
-        knots = place_knots(time, base + late, fit.period)
-        if knots.size < 2 * _ENDS:
-            return 0.0
-        return _fit_spline(time, values, knots, fit.interpolant)[1].size
-
-    reach = 0.1 * fit.period
     found = minimize_scalar(
-        compute_misfit, bounds=(-reach, reach), method="bounded", options={"xatol": 1e-5 * reach}
+        lambda late: min(fit_knots(time, values, move(late)).size, np.finfo(float).max),
+        bounds=(-0.1 * raster.period, 0.1 * raster.period),
+        method="bounded",
+        options={"xatol": 1e-6 * raster.period},
     )
-    better = found.fun < (1.0 - 1e-3) * compute_misfit(0.0)
-    return float(base + (found.x if better else 0.0))
+    better = found.fun < (1.0 - 1e-3) * fit_knots(time, values, raster).size
+    return move(float(found.x)) if better else raster
