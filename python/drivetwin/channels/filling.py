@@ -42,6 +42,8 @@ from drivetwin.channels.line_corners import (
 
 _WINDOW, _WINDOWS = 8192, 4
 """Rows of a window, and windows of a long record searched for a raster [count]: cost of work."""
+_CYCLE = 2048
+"""Changes that show whether numbers repeat in turn [count]: cost of work."""
 _LARGEST = 1e150
 """Magnitude of a damaged value, whose square overflows."""
 _STRIDES = (2, 4, 8)
@@ -100,7 +102,7 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
         time, values = time[usable], values[usable]
     if time.size < 2 * MIN_KNOTS or not is_time_axis(time):
         return None
-    if _is_cycle(values[:_WINDOW]):
+    if _is_cycle(values[1:][np.diff(values) != 0.0][:_CYCLE]):
         return None
     step = compute_median_step(time)
     if lines := find_corners(time, values):
@@ -133,8 +135,6 @@ def _list_windows(time: FloatArray, values: FloatArray) -> Iterator[slice]:
 
 def _find_raster(time: FloatArray, values: FloatArray) -> KnotRaster | None:
     """Find the regular raster of knots in an evenly sampled stretch."""
-    if _is_cycle(values):
-        return None
     step = float(time[-1] - time[0]) / (time.size - 1)
     periods = [step * period for period in _list_periods(values)]
     return find_raster_of_knots(time, values, periods, estimate_resolution(values), PRIOR)
@@ -164,6 +164,8 @@ def _is_cycle(values: FloatArray) -> bool:
     knots reproduce one round they reproduce all, which is no further evidence.
     """
     most = values.size // 4
+    if most < 1:
+        return False
     apart = [float(np.mean(np.abs(values[lag:] - values[:-lag]))) for lag in range(1, most + 1)]
     return min(apart) < apart[0] > 0.25 * max(apart)
 

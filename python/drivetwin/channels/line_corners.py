@@ -31,8 +31,9 @@ _QUANTILES = (0.05, 0.1, 0.25, 0.5)
 """Distances that a search for the period begins with, as shares of all: some rows are hidden."""
 _ROUNDS = 20
 """Steps of such a search [count]: cost of work."""
-_MOST_FILLED = 0.9
-"""Largest share of interpolated rows in a filling whose samples are not found."""
+_LEAST_FILLED, _MOST_FILLED = 0.01, 0.9
+"""Least ratio of interpolated rows to samples, and largest share of them where no sample is found:
+priors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,14 +176,15 @@ def _weigh_straight(count: float, expected: float) -> float:
     return count * float(np.log(more) - 1.0 + 1.0 / more) if more > 1.0 else 0.0
 
 
-def _weigh_signs(bends: FloatArray) -> float:
+def _weigh_signs(bends: FloatArray, largest: float) -> float:
     """Return the evidence of the signs of `bends` (m,) for knots with noise.
 
-    Those of a smooth curve, which rounding shows now and then, keep their sign as often as they
-    would change it at three of four knots with noise.
+    Those of a smooth curve, which rounding hides or shows, are at most the `largest`. They keep
+    their sign as often as they would change it at three of four knots with noise.
     """
-    changes = int(np.count_nonzero(bends[1:] * bends[:-1] < 0.0))
-    return float(np.log(3.0)) * (2 * changes - bends.size + 1)
+    small = bends[np.abs(bends) <= largest]
+    changes = int(np.count_nonzero(small[1:] * small[:-1] < 0.0))
+    return float(np.log(3.0)) * (2 * changes - max(small.size - 1, 0))
 
 
 def list_blurs(time: FloatArray) -> tuple[float, ...]:
@@ -211,16 +213,25 @@ def _weigh_corners(
     apart = time[last] - time[first]
     # Of a length without a scale each octave is as likely.
     scaleless = 1.0 / (count * np.log(time.size))
-    best: tuple[float, float, float] = (-np.inf, 0.0, 0.0)
-    cells = middle[last] - time[first], middle[last + 1] - time[first]
-    for period in np.unique(np.quantile(apart, _QUANTILES)):
-        best = max(best, _fit_raster(cells, apart, float(period), scaleless))
-    evidence = best[0] - _measure_chance(count, scaleless, seen.rounded)
-    evidence -= 2.0 * float(np.log(count.size))
+    # A raster has two unknowns more than a Markov chain.
+    against = _measure_chance(count, scaleless, seen.rounded) + float(np.log(count.size))
     if seen.rounded:
-        evidence += min(_weigh_signs(seen.bends[rows - 1]), 0.0)
+        against -= min(_weigh_signs(seen.bends[rows - 1], 2.0 * seen.step), 0.0)
+    if against + PRIOR > 0.0:  # more than a raster that fits exactly can have
+        return None
+    best = (-np.inf, 0.0)
+    cells = middle[last] - time[first], middle[last + 1] - time[first]
+    for rank in np.unique((np.array(_QUANTILES) * (count.size - 1)).astype(int)):
+        period = float(np.partition(apart, rank)[rank])
+        if abs(period - best[1]) > 1e-3 * period:
+            fit = _fit_raster(cells, apart, period, scaleless)
+            # If each row is a sample of the raster the record is not filled.
+            if fit[1] * (time.size - 1) > (1.0 + _LEAST_FILLED) * (time[-1] - time[0]):
+                best = max(best, fit)
+    if best[1] == 0.0:
+        return None
     periods = np.maximum(np.round(apart / best[1]), 1.0)
-    return _Corners(rows, float(np.median(apart / periods)), best[0], evidence)
+    return _Corners(rows, float(np.median(apart / periods)), best[0], best[0] - against)
 
 
 def _fit_raster(
@@ -253,7 +264,10 @@ def _fit_raster(
         low, high = (_compute_normal_share((one - periods * period) / jitter) for one in cells)
         often = (1.0 - hidden) * hidden ** (periods - 1.0) * (high - low)
         likely = stray * scaleless + (1.0 - stray) * often
-        best = max(best, (float(np.sum(np.log(likely))), period))
+        total = float(np.sum(np.log(likely)))
+        if total < best[0] + 0.01:
+            break
+        best = (total, period)
         weight = (1.0 - stray) * often / likely + 1e-9
         stray = max(1.0 - float(np.mean(weight)), 1e-6)
         period = float(np.sum(weight * periods * apart) / np.sum(weight * periods**2))
