@@ -181,8 +181,9 @@ def study_log(seed: int, *, harm: Harm, identified: bool) -> FilledResult:
 
 def is_found(filling: Filling | None, period: float) -> bool:
     """Return True if the knots of a filling have this period [s] within 5 per cent."""
-    known = filling is not None and filling.kind is not FillKind.UNKNOWN
-    return known and abs(filling.period - period) < 0.05 * period
+    if filling is None or filling.kind is FillKind.UNKNOWN:
+        return False
+    return abs(filling.period - period) < 0.05 * period
 
 
 def run_study(seeds: Sequence[int], *, harm: Harm, identified: bool) -> list[FilledResult]:

@@ -105,7 +105,8 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     if _is_cycle(values[1:][np.diff(values) != 0.0][:_CYCLE]):
         return None
     step = compute_median_step(time)
-    if lines := find_corners(time, values):
+    lines = find_corners(time, values)
+    if lines is not None:
         return Filling(FillKind.LINEAR, lines.period, step, lines.time, lines.values)
     for part in _list_windows(time, values):
         raster = _find_raster(time[part], values[part])
@@ -113,7 +114,8 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
         if filling is not None:
             return filling
     for stride in _STRIDES if len(list_blurs(time)) > 1 else ():
-        if lines := find_corners(time[::stride], values[::stride]):
+        lines = find_corners(time[::stride], values[::stride])
+        if lines is not None:
             return Filling(FillKind.LINEAR, lines.period, step, lines.time, lines.values)
     nothing = np.empty(0)
     unknown = Filling(FillKind.UNKNOWN, np.nan, step, nothing, nothing)

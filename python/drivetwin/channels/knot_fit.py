@@ -44,6 +44,11 @@ class Interpolant(StrEnum):
     PCHIP = "pchip"
     MAKIMA = "makima"
 
+    @property
+    def has_formula(self) -> bool:
+        """Whether the values at the knots determine the polynomial."""
+        return self is not Interpolant.HERMITE
+
 
 _FITTED = (Interpolant.LINEAR, Interpolant.SPLINE, Interpolant.HERMITE)
 
@@ -123,8 +128,8 @@ def _list_rasters(
     """
     rows = round(period / step)
     if abs(period / step - rows) < _WHOLE * rows and rows > 1:
-        few = (one for one in Interpolant if one is not Interpolant.HERMITE)
-        for interpolant in few if rows < _FEW_ROWS else Interpolant:
+        few = rows < _FEW_ROWS
+        for interpolant in (one for one in Interpolant if not few or one.has_formula):
             rasters = [KnotRaster(float(t), rows * step, interpolant, True) for t in time[:rows]]
             # A cubic one shows where the knots are also by lines, which are fast.
             rasters.sort(key=lambda one: _fit_lines(time, values, one, step))
