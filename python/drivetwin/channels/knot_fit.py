@@ -297,25 +297,27 @@ def _refine_raster(time: FloatArray, values: FloatArray, raster: KnotRaster) -> 
     from scipy.optimize import minimize
 
     interpolant = raster.interpolant
+
+    def move(x: FloatArray, middle: FloatArray, scale: FloatArray) -> KnotRaster:
+        start, period = middle + x * scale
+        return KnotRaster(float(start), float(period), interpolant, False)
+
+    def compute(x: FloatArray, middle: FloatArray, scale: FloatArray, part: slice) -> float:
+        return fit_knots(time[part], values[part], move(x, middle, scale)).size
+
     for part in (slice(0, time.size // 4), slice(None)):
         length = float(time[part][-1] - time[part][0])
         start = raster.start + raster.period * round(0.5 * length / raster.period)
         scale = np.array([0.03 * raster.period, 0.1 * raster.period**2 / length])
         middle = np.array([start, raster.period])
-
-        def move(
-            x: FloatArray, middle: FloatArray = middle, scale: FloatArray = scale
-        ) -> KnotRaster:
-            start, period = middle + x * scale
-            return KnotRaster(float(start), float(period), interpolant, False)
-
         found = minimize(
-            lambda x, part=part, move=move: fit_knots(time[part], values[part], move(x)).size,
+            compute,
             np.zeros(2),
+            (middle, scale, part),
             method="Nelder-Mead",
             options={"initial_simplex": [[0, 0], [1, 0], [0, 1]], "maxfev": 70, "xatol": 1e-5},
         )
-        raster = move(found.x)
+        raster = move(found.x, middle, scale)
     return raster
 
 
