@@ -19,9 +19,11 @@ from drivetwin.calibration.scenarios import scale_units
 from drivetwin.calibration.spread import Spread
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.dyno.departed_run import DepartedVehicle
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
-from drivetwin.dyno.sensors import compute_torque_error
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
+    SyntheticVehicle,
+    TorqueError,
+)
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.simulation.dual_clutch import Signal
@@ -37,7 +39,7 @@ class TrueUnits:
 
     made: MadeVehicle
     shift: Maneuver
-    units: Sequence[DepartedVehicle]
+    units: Sequence[SyntheticVehicle]
 
     def evaluate_all(self, controls: Sequence[Control]) -> list[Outcome]:
         """Return the metrics of each control over all units."""
@@ -53,7 +55,7 @@ class TrueUnits:
         start = shift.build_start()
         runs, locks = [], []
         for unit in self.units:
-            run = unit.simulate(*acting, start, shift.time)
+            run = replace(unit, **acting).simulate(start, shift.time)
             pairs = [one[name] for name in names for one in (run.clutch_torque, run.slip)]
             runs.append(np.stack([run.shaft_torque, *pairs]))
             held = [
@@ -115,7 +117,7 @@ def record_shift(made: MadeVehicle, shift: Maneuver, control: Profiles, seed: in
     pressures = {one.name: inputs[f"pressure.{one.name}"] for one in true.model.elements}
     seen = list_sampling_instants(sensors, duration)
     run = made.simulate(early, inputs["engine_torque"], pressures, seen)
-    error = compute_torque_error({}, 0.0, seed, 0.0)
+    error = TorqueError()
     channels = record_channels(
         sensors, duration, Motion(run, scenario.model.i_in, inputs, error), 1.0, seed
     )

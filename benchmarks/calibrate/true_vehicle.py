@@ -9,9 +9,11 @@ the start to that task, with the pressures of the true actuators.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 from scipy.signal import lfilter
@@ -36,16 +38,15 @@ from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import ControlledActuator, Program
-from drivetwin.dyno.departed_run import (
-    DepartedVehicle,
-    NominalRun,
-    build_acting_inputs,
-    compute_vehicle,
-)
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import convert_channels
+from drivetwin.dyno.mismatched_run import apply_effects
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.sensors import Sensor
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
+    NominalRun,
+    SyntheticVehicle,
+)
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log
 from drivetwin.pipeline import identify
@@ -74,6 +75,13 @@ COMMAND_RATE = 100.0
 """Rate of the logged commands [Hz]."""
 _STEP = 1e-3
 """Sampling step of inputs and pressures [s]."""
+
+
+class ActingInputs(TypedDict):
+    """Engine torque [N m] and pressures [Pa] as they act on a vehicle."""
+
+    engine_torque: Signal
+    pressures: Mapping[str, Signal]
 
 
 @dataclass(frozen=True)
@@ -111,26 +119,26 @@ class MadeVehicle:
         return NominalRun(self.scenario.model, clean.trajectory, torque, pressures)
 
     @cached_property
-    def vehicle(self) -> DepartedVehicle:
+    def vehicle(self) -> SyntheticVehicle:
         """Vehicle with the effects."""
         gears = [gear.element for gear in self.scenario.gears]
-        return compute_vehicle(self.nominal, self.effects, gears, self.seed)
+        return apply_effects(self.nominal, self.effects, gears, self.seed)
 
     def simulate(
         self, shift: Maneuver, torque: Signal, pressures: dict[str, Signal], time: FloatArray
     ) -> Trajectory:
         """Simulate a shift with pressures at the clutches on `time` (n,) [s]."""
         start = replace(shift, model=self.scenario.model).build_start()
-        return self.vehicle.simulate(*self.build_acting(torque, pressures), start, time)
+        acting = self.build_acting(torque, pressures)
+        return replace(self.vehicle, **acting).simulate(start, time)
 
-    def build_acting(
-        self, torque: Signal, pressures: dict[str, Signal]
-    ) -> tuple[Signal, dict[str, Signal]]:
+    def build_acting(self, torque: Signal, pressures: dict[str, Signal]) -> ActingInputs:
         """Return engine torque and pressures as they act on the vehicle."""
         given = _LogRanges(
             self.scenario.model, self.nominal.trajectory, torque, pressures, self.nominal
         )
-        return build_acting_inputs(given, self.effects, self.nominal.trajectory)
+        found = apply_effects(given, self.effects, self.vehicle.gears, self.seed)
+        return {"engine_torque": found.engine_torque, "pressures": found.pressures}
 
 
 def make_vehicle(seed: int, *, whole: bool = True) -> MadeVehicle:

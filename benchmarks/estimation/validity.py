@@ -22,8 +22,8 @@ from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.causes import CAUSES
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.drum_inertia import REFERENCE_TORQUE
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
+from drivetwin.estimation.likelihood.effects.gearbox import REFERENCE_TORQUE
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify

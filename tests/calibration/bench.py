@@ -12,7 +12,8 @@ from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
-from drivetwin.dyno.sensors import Sensor, compute_torque_error
+from drivetwin.dyno.sensors import Sensor
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import TorqueError
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch
@@ -62,6 +63,6 @@ def write_bench_log(
         "engine_torque": given.engine_torque,
         **{f"pressure.{name}": one for name, one in pressures.items()},
     }
-    motion = Motion(run, model.i_in, inputs, compute_torque_error({}, 0.0, seed, 0.0))
+    motion = Motion(run, model.i_in, inputs, TorqueError())
     channels = record_channels(SENSORS, shift.horizon, motion, 1.0, seed)
     write_log(path, tuple(convert_to_recorded_units(one) for one in channels))

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.scenarios import TwinDraws
 from drivetwin.calibration.spread import Spread
-from drivetwin.estimation.likelihood.effects.pressure_delay import EFFECT as DELAY
+from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
 from drivetwin.estimation.result.verdict import assess
@@ -28,6 +28,7 @@ from drivetwin.twin.friction_law import (
 )
 from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
 from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
+from drivetwin.vehicle.effects import EffectId
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +218,7 @@ def build_unknowns(twin: Twin, shift: Shift, spread: Spread) -> VehicleUnknowns:
     mean = np.concatenate([own, *(one.mean for one in friction)])
     known = collect_covariance(twin, ids)
     if PRESSURE_DELAY not in twin.covariance_ids:
-        known[-1, -1] = DELAY.std**2
+        known[-1, -1] = EFFECTS[EffectId.PRESSURE_DELAY].std ** 2
     _add_spread(known, dict(zip(ids, own, strict=True)), spread)
     covariance = block_diag(known, *(one.covariance for one in friction))
     scale = np.where(mean == 0.0, 1.0, np.abs(mean))

@@ -13,12 +13,18 @@ from numpy.typing import NDArray
 from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.actuators import ControlledActuator
-from drivetwin.dyno.departed_run import NominalRun, is_departed, simulate_departed
-from drivetwin.dyno.effects import Effects, check_effects
+from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects, check_effects
+from drivetwin.dyno.mismatched_run import (
+    apply_effects,
+    changes_motion,
+    delay_output_torque,
+    simulate_with_effects,
+)
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.sensors import Sensor, TorqueError, apply_delay, compute_torque_error
+from drivetwin.dyno.sensors import Sensor
 from drivetwin.dyno.truth import Truth, compute_truth
 from drivetwin.errors import InputError, SimulationError, Where
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import NominalRun, TorqueError
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import Signal, Trajectory
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
@@ -51,8 +57,8 @@ def run(
     """Simulate the scenario and record it.
 
     `noise` scales the white noise of all sensors; 0 makes them ideal (no noise, no rounding) while
-    their rates and delays stay. `effects` are the sizes, by `EffectId`, of departures from the
-    dual-clutch model; the truth stays that of the model. The same arguments give the same log, bit
+    their rates and delays stay. `effects` are the sizes, by `EffectId`, of what the dual-clutch
+    model leaves out; the truth stays that of the model. The same arguments give the same log, bit
     for bit.
     Raises SimulationError where the run does not complete, InputError for a noise that is negative
     or infinite and for impossible effects.
@@ -64,9 +70,16 @@ def run(
             Where(key="noise"),
         )
     sizes = check_effects(effects or {})
-    sensors = apply_delay(scenario.sensors, sizes)
+    nominal, error = _compute_nominal(scenario, sizes, seed)
+    sensors = delay_output_torque(scenario.sensors, error, sizes)
     seen = list_sampling_instants(sensors, scenario.duration)
-    motion = _simulate_effects(scenario, sizes, seed, seen)
+    if nominal is None:
+        trajectory, inputs = _simulate(scenario, _build_inputs(scenario), seen)
+    else:
+        trajectory = simulate_with_effects(scenario, nominal, sizes, seed, seen)
+        _check_completed(scenario, trajectory)
+        inputs = _build_inputs(scenario).list_by_role(scenario)
+    motion = Motion(trajectory, scenario.model.i_in, inputs, error)
     channels = record_channels(sensors, scenario.duration, motion, noise, seed)
     truth = compute_truth(scenario, motion.trajectory, sizes)
     return DynoRun(scenario, seed, noise, channels, truth, motion.trajectory)
@@ -107,22 +120,21 @@ def record_channels(
     return tuple(channels)
 
 
-def _simulate_effects(scenario: Scenario, effects: Effects, seed: int, time: FloatArray) -> Motion:
-    given, i_in = _build_inputs(scenario), scenario.model.i_in
+def _compute_nominal(
+    scenario: Scenario, effects: Effects, seed: int
+) -> tuple[NominalRun | None, TorqueError]:
+    """Compute the run to which effects on the motion are related, None without any, and the error
+    of the torque sensor."""
     if not effects:
-        trajectory, inputs = _simulate(scenario, given, time)
-        return Motion(trajectory, i_in, inputs, compute_torque_error({}, 0.0, seed, 0.0))
-    departed = is_departed(scenario, effects)
+        return None, TorqueError()
+    moving, given = changes_motion(scenario, effects), _build_inputs(scenario)
     grid = given.engine_torque.time
     reference, _ = _simulate(scenario, given, grid[grid <= scenario.duration])
     nominal = NominalRun(scenario.model, reference, given.engine_torque, given.pressures)
-    error = compute_torque_error(effects, nominal.largest_shaft_torque, seed, scenario.duration)
-    if not departed:
-        trajectory, inputs = _simulate(scenario, given, time)
-        return Motion(trajectory, i_in, inputs, error)
-    trajectory = simulate_departed(scenario, nominal, effects, seed, time)
-    _check_completed(scenario, trajectory)
-    return Motion(trajectory, i_in, given.list_by_role(scenario), error)
+    gears = [gear.element for gear in scenario.gears]
+    sensor = {name: size for name, size in effects.items() if name in SENSOR_EFFECTS}
+    error = apply_effects(nominal, sensor, gears, seed).output_torque
+    return nominal if moving else None, error
 
 
 def _compute_sampling_instants(sensor: Sensor, stamps: FloatArray) -> FloatArray:

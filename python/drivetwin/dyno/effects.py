@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sizes of the effects by which a run departs from the dual-clutch model."""
+"""Sizes of the effects in a synthetic log that the dual-clutch model leaves out."""
 
 from __future__ import annotations
 
@@ -7,27 +7,15 @@ import math
 from collections.abc import Mapping, Sequence
 
 from drivetwin.errors import InputError, Where
+from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.vehicle.effects import EffectId, parse_sizes
 
 Effects = Mapping[EffectId, float]
-"""Sizes by effect, in the units of `EffectId`; an effect of size 0 changes nothing."""
+"""Sizes by effect, in the units of its entry; an effect of size 0 changes nothing."""
 
-SENSOR_EFFECTS = frozenset(
-    {
-        EffectId.OUTPUT_TORQUE_OFFSET,
-        EffectId.OUTPUT_TORQUE_DRIFT,
-        EffectId.OUTPUT_TORQUE_DELAY,
-    }
-)
+SENSOR_EFFECTS = frozenset(name for name, one in EFFECTS.items() if one.on_sensor)
 """Effects that change the recorded output torque and leave the motion as it is."""
-_LIMITS = {
-    EffectId.AERO_LOAD: 1.0,
-    EffectId.TYRE_SLIP: 1.0,
-    EffectId.PROGRESSIVE_SHAFT: 2.0,
-    EffectId.FRICTION_PRESSURE: 2.0,
-    EffectId.FRICTION_HEAT: 1.0,
-}
-"""Sizes from which a torque would reverse or a share exceed the whole."""
+_LIMITS = {name: one.limit for name, one in EFFECTS.items() if one.limit < math.inf}
 _KEY = Where(key="effect")
 
 

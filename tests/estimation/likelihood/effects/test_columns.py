@@ -15,7 +15,7 @@ from drivetwin.estimation.likelihood.effects.columns import (
     build_columns,
     observe,
 )
-from drivetwin.estimation.likelihood.effects.drum_inertia import REFERENCE_TORQUE
+from drivetwin.estimation.likelihood.effects.gearbox import REFERENCE_TORQUE
 from drivetwin.estimation.likelihood.effects.operating_point import (
     OperatingPoint,
     evaluate_operating_point,

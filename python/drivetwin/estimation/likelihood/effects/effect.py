@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Description of an effect that the model leaves out: meaning, prior size, columns."""
+"""Entry of an effect: meaning, prior size, columns of a fit, action in a synthetic log."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
 from drivetwin.vehicle.effects import EffectId
 
 
@@ -33,11 +35,13 @@ class Disturbance:
 Builder = Callable[[OperatingPoint, float], Sequence[Disturbance]]
 """Builds the columns of an effect at an operating point for one standard deviation of its prior,
 given in the unit of the effect. Columns of one subject are independent; they form one group."""
+Action = Callable[[SyntheticVehicle, float], SyntheticVehicle]
+"""Applies an effect of a size above 0 to the vehicle of a synthetic log."""
 
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One departure from the model.
+    """One entry of the table of effects.
 
     `std` is the default standard deviation of its normal prior about zero in `unit`, `source` the
     reason for it. `meaning` completes "the log shows ..."; `remedy` is advice where it is found.
@@ -54,6 +58,7 @@ class Effect:
     source: str
     remedy: str
     build: Builder
+    apply: Action
     random: bool = False
     power: float = 1.0
     curved: bool = False
@@ -62,6 +67,10 @@ class Effect:
     """False where no column at the minimum of the dual clutch describes the effect."""
     negative: str = ""
     """Meaning of a negative size, where its sign is not evident."""
+    limit: float = math.inf
+    """Size in a synthetic log from which a torque would reverse or a share exceed the whole."""
+    on_sensor: bool = False
+    """True where the effect changes the recorded output torque and leaves the motion as it is."""
 
     def scale_amount(self, amount: float, std: float) -> float:
         """Return the size of an `amount`, in units of the columns, of the stated size `std`."""

@@ -3,53 +3,24 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 from drivetwin.estimation.likelihood.effects import (
-    aero_load,
-    backlash,
-    brake_drag,
-    drum_inertia,
-    efficiency_by_gear,
-    friction_heat,
-    friction_pressure,
-    friction_shape,
-    input_drag,
-    input_shaft_mode,
-    output_torque_delay,
-    output_torque_drift,
-    output_torque_offset,
-    pressure_delay,
-    progressive_shaft,
-    slow_load,
-    torque_lag,
-    tyre_slip,
+    friction,
+    gearbox,
+    inputs,
+    load,
+    shaft,
+    torque_sensor,
+    tyre,
 )
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.result.cause import Group
 from drivetwin.vehicle.effects import EffectId
 
-EFFECTS: dict[EffectId, Effect] = {
-    one.id: one
-    for one in (
-        efficiency_by_gear.EFFECT,
-        input_drag.EFFECT,
-        output_torque_offset.EFFECT,
-        output_torque_drift.EFFECT,
-        output_torque_delay.EFFECT,
-        slow_load.EFFECT,
-        aero_load.EFFECT,
-        brake_drag.EFFECT,
-        drum_inertia.EFFECT,
-        pressure_delay.EFFECT,
-        torque_lag.EFFECT,
-        input_shaft_mode.EFFECT,
-        tyre_slip.EFFECT,
-        backlash.EFFECT,
-        progressive_shaft.EFFECT,
-        friction_shape.EFFECT,
-        friction_pressure.EFFECT,
-        friction_heat.EFFECT,
-    )
-}
+_FILES = (gearbox, torque_sensor, load, inputs, shaft, tyre, friction)
+_BY_ID = {one.id: one for one in chain.from_iterable(each.EFFECTS for each in _FILES)}
+EFFECTS: dict[EffectId, Effect] = {name: _BY_ID[name] for name in EffectId}
 """Effects by name, in the order in which they are reported."""
 
 

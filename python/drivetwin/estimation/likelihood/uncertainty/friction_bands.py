@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.expansion import SHOWN
-from drivetwin.estimation.likelihood.effects.friction_shape import FrictionShapes, has_free_law
+from drivetwin.estimation.likelihood.effects.friction import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW

@@ -10,13 +10,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.effects.brake_drag import EFFECT
 from drivetwin.estimation.likelihood.effects.columns import observe
+from drivetwin.estimation.likelihood.effects.load import BRAKE_DRAG
 from drivetwin.estimation.likelihood.effects.operating_point import (
     OperatingPoint,
     evaluate_operating_point,
 )
-from drivetwin.vehicle.effects import EffectId
 from tests.estimation.likelihood.fixtures import bench, problem
 
 STD = 0.01
@@ -79,8 +78,7 @@ NAMES = ("engine_speed", "output_speed", "wheel_speed", "output_torque")
 
 def test_the_column_is_the_motion_of_the_locked_driveline(at: OperatingPoint) -> None:
     """Before the torque phase from rest, after lock-up from the state that the response has."""
-    (drag,) = EFFECT.build(at, STD)
-    assert EFFECT.id is EffectId.BRAKE_DRAG
+    (drag,) = BRAKE_DRAG.build(at, STD)
     assert drag.force is not None
     shift = bench(noise=0.0).signals.shift
     state = at.response.propagate_forces(drag.force)
@@ -101,7 +99,7 @@ def test_the_column_is_the_motion_of_the_locked_driveline(at: OperatingPoint) ->
 
 
 def test_the_torque_falls_from_its_share_of_the_load_to_zero(at: OperatingPoint) -> None:
-    (drag,) = EFFECT.build(at, STD)
+    (drag,) = BRAKE_DRAG.build(at, STD)
     assert drag.force is not None
     torque, step = -drag.force[:, 2], np.diff(at.run.time)
     largest = STD * at.load * at.model.i_f
@@ -112,7 +110,7 @@ def test_the_torque_falls_from_its_share_of_the_load_to_zero(at: OperatingPoint)
 
 def test_without_fading_the_column_is_a_change_of_the_load(at: OperatingPoint) -> None:
     """Through the whole shift, with the torque held at its start, against runs of the core."""
-    (drag,) = EFFECT.build(at, STD)
+    (drag,) = BRAKE_DRAG.build(at, STD)
     assert drag.force is not None
     held = np.zeros_like(drag.force)
     held[:, 2] = -STD * at.load * at.model.i_f

@@ -1,16 +1,57 @@
 # SPDX-License-Identifier: MIT
-"""First-order lag between logged and acting engine torque, beside their delay."""
+"""Inputs that act at other times than they are logged."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import apply_lag
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
 from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId
+
+
+def build_pressure_delay(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Delay the pressure of each element, by the rate of the pressure without noise."""
+    found = []
+    for name, signal in at.record.pressures.items():
+        sigma = at.record.input_sigma[name]
+        steady = smooth_adaptive(MeasuredSignal(signal.time, signal.values, sigma))
+        rate = at.compute_rate(np.interp(at.run.time, signal.time, steady))
+        found.append(Disturbance(name, inputs={name: -std * rate}))
+    return found
+
+
+def apply_pressure_delay(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
+    """Delay the pressures; each has its first value before it starts."""
+    pressures = {}
+    for name, one in vehicle.pressures.items():
+        time = np.concatenate([[one.time[0] - size], one.time])
+        pressures[name] = Signal(time, np.concatenate([one.values[:1], one.values]), size)
+    return replace(vehicle, pressures=pressures)
+
+
+PRESSURE_DELAY = Effect(
+    EffectId.PRESSURE_DELAY,
+    "a clutch pressure that acts later than it is measured",
+    "s",
+    0.003,
+    "typical range of lines between sensor port and piston and of filters of pressure sensors, 1 "
+    "to 5 ms",
+    "set time_shift_s of the pressure in the channel mapping and compare",
+    build_pressure_delay,
+    apply_pressure_delay,
+    negative="negative: the measured pressure is late",
+)
+
 
 STEP_S = 2e-3
 """Raster [s] of the torque: a tenth of the usual lag."""
@@ -19,7 +60,7 @@ SMOOTHED = 0.5
 hardly changes the response to a lag."""
 
 
-def build(at: OperatingPoint, std: float) -> list[Disturbance]:
+def build_torque_lag(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Change the acting torque as a lag of `std` [s] does beyond a pure delay.
 
     With s the derivative by time, an acting torque that lags by τ > 0 is T/(1 + τs), one whose
@@ -45,16 +86,28 @@ def _remove_lag(torque: FloatArray, lag: float) -> FloatArray:
     return np.asarray(torque + lag * np.gradient(smooth, STEP_S))
 
 
-EFFECT = Effect(
+def apply_torque_lag(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
+    """Apply the lag to the evenly sampled engine torque, at rest before its start."""
+    logged = vehicle.engine_torque
+    step = float(logged.time[1] - logged.time[0])
+    lagged = Signal(logged.time, apply_lag(logged.values, step, size))
+    return replace(vehicle, engine_torque=lagged)
+
+
+TORQUE_LAG = Effect(
     EffectId.TORQUE_LAG,
     "a lag of the engine torque beside its delay",
     "s",
     0.02,
     "typical range of filters by which engine controllers send their torque, 10 to 30 ms",
     "record the engine torque unfiltered, or at a faster rate",
-    build,
+    build_torque_lag,
+    apply_torque_lag,
     power=2.0,
     curved=True,
     signed=True,
     negative="negative: the logged engine torque lags the acting one",
 )
+
+
+EFFECTS = (PRESSURE_DELAY, TORQUE_LAG)

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""Laws of the input and output shafts beside a linear output shaft."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
+from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
+from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint, compute_middle
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.simulation.vehicle_parts import InputShaft, ShaftTable, compute_gap
+from drivetwin.vehicle.effects import EffectId
+
+_MODE_SHARE, _MODE_DAMPING = 0.5, 0.06
+"""Share of J1 at the engine and damping ratio of the mode in a synthetic log."""
+
+
+def build_input_shaft_mode(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Build no column: k_o absorbs a mode before it shows, so it is tried in the plant alone."""
+    del at, std
+    return []
+
+
+def apply_input_shaft_mode(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
+    """Put a shaft into J1."""
+    front = InputShaft.from_mode(_MODE_SHARE * vehicle.model.J1, size, _MODE_DAMPING)
+    return replace(vehicle, parts=replace(vehicle.parts, front=front))
+
+
+INPUT_SHAFT_MODE = Effect(
+    EffectId.INPUT_SHAFT_MODE,
+    "a second torsional mode at the gearbox input",
+    "Hz",
+    50.0,
+    "middle of the typical range of torsional dampers and input shafts of trucks and cars, 20 to "
+    "130 Hz with the gearbox held",
+    "the mode moves k_o, c_o and J′: compare its frequency with that of the torsional damper",
+    build_input_shaft_mode,
+    apply_input_shaft_mode,
+    has_columns=False,
+)
+
+
+def build_shaft_disturbance(at: OperatingPoint, torque: FloatArray) -> Disturbance:
+    """Build the action of an additional shaft torque (N,) [N m] on both of its ends and on the
+    output torque that is measured there."""
+    middle = compute_middle(torque)
+    force = at.build_force(1, -middle) + at.build_force(2, at.model.i_f * middle)
+    return Disturbance(force=force, outputs={OUTPUT_TORQUE: torque})
+
+
+ROUNDING = 0.03
+"""Share of the largest torque over which the sign is rounded: a sensor's noise about zero."""
+REVERSED = 0.5
+"""Change of the rounded sign from which the torque counts as reversed."""
+
+
+def build_backlash(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Shift the characteristic of the shaft by half the gap to the side of its torque.
+
+    Half a gap Δ with T = k_o·(φ - Δ·sign T) changes the torque at a given twist by -k_o·Δ·sign T.
+    Nothing where the torque keeps its sign: the gap is then part of the initial twist.
+    """
+    largest = at.largest_shaft_torque
+    sign = np.tanh(at.run.shaft_torque / (ROUNDING * largest))
+    if np.ptp(sign) <= REVERSED:
+        return []
+    return [build_shaft_disturbance(at, -std * largest * (sign - sign[0]))]
+
+
+def apply_backlash(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
+    """Give the output shaft its play."""
+    gap = compute_gap(size, vehicle.nominal.largest_shaft_torque, vehicle.model.k_o)
+    return replace(vehicle, parts=replace(vehicle.parts, gap=gap))
+
+
+BACKLASH = Effect(
+    EffectId.BACKLASH,
+    "backlash in the driveline",
+    "half gap times stiffness, of the largest shaft torque",
+    0.03,
+    "typical range of 1 to 3 degrees at the wheel, less what the preload takes; see Lagerberg and "
+    "Egardt, IEEE Trans. CST 15, 2007, on backlash of powertrains",
+    "use shifts in which the shaft torque keeps its sign",
+    build_backlash,
+    apply_backlash,
+)
+
+
+def build_progressive_shaft(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Add a cubic term to the torque over the twist, less half of it at the largest torque."""
+    linear = at.model.k_o * at.run.twist
+    cubic = linear * ((linear / at.largest_shaft_torque) ** 2 - 0.5)
+    return [build_shaft_disturbance(at, std * cubic)]
+
+
+def apply_progressive_shaft(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
+    """Replace the linear output shaft by a table."""
+    full = vehicle.nominal.largest_shaft_torque
+    table = ShaftTable.from_factor(vehicle.model.k_o, full, size)
+    return replace(vehicle, parts=replace(vehicle.parts, shaft_table=table))
+
+
+PROGRESSIVE_SHAFT = Effect(
+    EffectId.PROGRESSIVE_SHAFT,
+    "a shaft that stiffens with its twist",
+    "of the stiffness at the largest shaft torque",
+    0.015,
+    "engineering estimate: joints, splines and tyres in series with a steel shaft make a "
+    "characteristic progressive by 1 to 3 %",
+    "compare shifts at two torque levels",
+    build_progressive_shaft,
+    apply_progressive_shaft,
+    limit=2.0,
+)
+
+
+EFFECTS = (INPUT_SHAFT_MODE, BACKLASH, PROGRESSIVE_SHAFT)
