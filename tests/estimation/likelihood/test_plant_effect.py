@@ -8,7 +8,7 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.plant_refit import (
+from drivetwin.estimation.likelihood.selection.plants import (
     build_plant_priors,
     extend_problem,
 )

@@ -29,8 +29,8 @@ from drivetwin.estimation.likelihood.effects.correction import Correction, corre
 from drivetwin.estimation.likelihood.effects.rival_causes import widen_by_rivals
 from drivetwin.estimation.likelihood.effects.withdrawal import compute_doubt, find_unreliable
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.selection.candidates import collect_loads
 from drivetwin.estimation.likelihood.selection.loss_law import check_other_law
-from drivetwin.estimation.likelihood.selection.per_shift_load import collect_loads
 from drivetwin.estimation.likelihood.uncertainty.card_numbers import rank_card_numbers
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_laws,

@@ -13,7 +13,6 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.excluded import admit_excluded
-from drivetwin.estimation.likelihood.effects.plant_refit import build_plant_priors, select_plant
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
@@ -22,10 +21,12 @@ from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque impor
 )
 from drivetwin.estimation.likelihood.parametrization import LOAD_DEVIATION, build_load_deviations
 from drivetwin.estimation.likelihood.priors import build_problem
+from drivetwin.estimation.likelihood.selection.candidates import try_plants
 from drivetwin.estimation.likelihood.selection.lower_gear_search import (
     fit_from_lower_gear,
     fit_with_backlash,
 )
+from drivetwin.estimation.likelihood.selection.plants import build_plant_priors
 from drivetwin.estimation.likelihood.selection.sampling_mode import report_modes
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
@@ -160,7 +161,7 @@ def _fit(
             best, notes = found, tuple(report_modes(found.problem.kinds))
     with _STAGES.enter("plant", "parts of the plant"):
         admitted, warnings = admit_excluded(best, priors)
-        return _SelectedFit(select_plant(best, admitted), admitted, (*notes, *warnings))
+        return _SelectedFit(try_plants(best, admitted), admitted, (*notes, *warnings))
 
 
 def _search_again(

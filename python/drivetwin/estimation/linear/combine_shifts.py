@@ -93,9 +93,8 @@ def _merge_separate_loads(
     ]
     ids, values, covariance = _join_shifts(own)
     first, *others = [ids.index(f"{LOAD}@{k}") for k in range(len(shifts))]
-    rows = np.eye(len(ids))
-    differences = rows[others] - rows[first]
-    if is_common_load(differences @ values, differences @ covariance @ differences.T):
+    rows, loads = np.eye(len(ids)), [first, *others]
+    if is_common_load(values[loads], covariance[np.ix_(loads, loads)]):
         return None
     rows[first, [first, *others]] = 1.0 / len(shifts)
     kept = [k for k in range(len(ids)) if k not in others]

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
@@ -26,6 +25,7 @@ from drivetwin.estimation.data.vehicle_balance import (
     build_recorded_windows,
 )
 from drivetwin.estimation.regression.errors_in_variables import Fit, Prior
+from drivetwin.estimation.result.cause import SHOWN
 from drivetwin.findings import Code, Finding, Number, report
 
 
@@ -33,13 +33,8 @@ from drivetwin.findings import Code, Finding, Number, report
 class LoadSettings:
     """Settings of the load and of its growth with speed."""
 
-    min_common_load: float = 0.05
-    """Probability of one load below which each shift has its own [probability]. High: a load too
-    many costs a little width, one too few moves J3 and η on hills."""
     aero_std: float = 10.0
     """Plausible air drag at the wheel [N m s^2/rad^2]: of a lorry 1 to 3, of a car 0.1."""
-    significant: float = 3.0
-    """Growing part of the load from which it is kept [standard deviations]."""
     settling: float = 0.5
     """Time after lock-up in which the output speed cannot replace the wheel speed [s]."""
 
@@ -80,12 +75,42 @@ class LoadFit:
         return float(self.fit.theta[INERTIA])
 
 
-def is_common_load(differences: FloatArray, covariance: FloatArray) -> bool:
-    """Test if loads with the `differences` (m,) of covariance (m, m) fit one load."""
-    scale = np.sqrt(np.diag(covariance))
-    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
-    unit = differences / scale
-    return bool(unit @ inverse @ unit < chdtri(differences.size, LOAD_BALANCE.min_common_load))
+def compute_term_evidence(values: FloatArray, covariance: FloatArray, std: float) -> float:
+    """Compute the log evidence of a term of the load against its absence.
+
+    With the prior variance S = `std`²·1 of its unknowns about zero, and their estimates v of
+    covariance C, it is ½·vᵀ(C⁻¹ - (C + S)⁻¹)v - ½·log|1 + C⁻¹S|.
+
+    Parameters
+    ----------
+    values
+        Estimates (m,) of the unknowns.
+    covariance
+        Their covariance (m, m).
+    std
+        Prior standard deviation of each.
+
+    Returns
+    -------
+    float
+        Log evidence [-].
+    """
+    unit, own = values / std, covariance / std**2
+    wide = own + np.eye(unit.size)
+    explained = unit @ (np.linalg.pinv(own, hermitian=True) - np.linalg.inv(wide)) @ unit
+    volume = np.linalg.slogdet(wide)[1] - np.linalg.slogdet(own)[1]
+    return float(0.5 * explained - 0.5 * volume)
+
+
+def is_common_load(loads: FloatArray, covariance: FloatArray) -> bool:
+    """Return whether one load of all shifts is likelier than one of each, with odds of 20.
+
+    A load too many costs a little width, one too few moves J3 and η on hills. The grade changes
+    `loads` (n,) of covariance (n, n) by about as much as they are.
+    """
+    rows = np.eye(loads.size)[1:] - np.eye(loads.size)[0]
+    scale = float(np.sqrt(np.mean(np.square(loads))))
+    return compute_term_evidence(rows @ loads, rows @ covariance @ rows.T, scale) < -SHOWN
 
 
 def report_different_loads(loads: Sequence[float]) -> list[Finding]:
@@ -114,7 +139,9 @@ def find_growth_reference(signals: Sequence[ShiftSignals], i_f: float) -> float 
     fits = [estimate_momentum_load(s, i_f, select_load_spans(s), speed).fit for s in signals]
     growth = np.array([fit.theta[GROWTH] for fit in fits])
     weight = np.array([fit.std[GROWTH] ** -2 for fit in fits])
-    return speed if growth @ weight > LOAD_BALANCE.significant * np.sqrt(np.sum(weight)) else None
+    mean, variance = growth @ weight / np.sum(weight), 1.0 / np.sum(weight)
+    nats = compute_term_evidence(np.array([mean]), np.array([[variance]]), LOAD_BALANCE.aero_std)
+    return speed if mean > 0.0 and nats > SHOWN else None
 
 
 def compute_mean_speed(signals: Sequence[ShiftSignals], i_f: float) -> float:

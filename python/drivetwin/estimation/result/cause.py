@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cause of a departure from the model that the log shows."""
+"""Cause of a model mismatch that the log shows."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from dataclasses import dataclass
 
 from drivetwin.vehicle.effects import EffectId
 
+SHOWN = 3.0
+"""Log evidence from which an effect moves the values: odds of 20. Effects with less widen the
+intervals, and the values stay those that simulate best without them."""
 LEAD = 5.0
-"""Lead of log evidence over the next cause from which a cause counts as found: odds of 150 to 1."""
+"""Log evidence from which a cause is named or an element put into the plant, and its lead over the
+next cause from which it counts as found: odds of 150 to 1."""
 WRONG_ENTRY = 10.0
 """Lead of log evidence of a wrong entry of the card over any effect: entries of a card are rarely
 wrong (odds of e⁵ against it), and it must lead as a cause does (e⁵)."""

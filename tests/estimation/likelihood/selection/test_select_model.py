@@ -19,7 +19,7 @@ from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import correct_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
-from drivetwin.estimation.likelihood.selection import aero_load
+from drivetwin.estimation.likelihood.selection import candidates
 from drivetwin.estimation.likelihood.selection import select_model as selection_module
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
 from drivetwin.estimation.likelihood.selection.select_model import select_model
@@ -67,7 +67,7 @@ def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.Monk
     base = load_scenario("throttle_steps")
     load = RoadLoad(base.model.load.constant, aero=GROWTH)
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
-    monkeypatch.setattr(aero_load, "is_significant", lambda *_: False)
+    monkeypatch.setattr(candidates, "SHOWN", np.inf)
     fit, notes = _chosen(made)
     assert AERO not in fit.point.names
     assert Code.LOAD_GROWS not in [note.code for note in notes]

@@ -17,7 +17,7 @@ from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS, describe_group
 from drivetwin.estimation.likelihood.effects.withdrawal import WITHDRAWAL, find_large_groups
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.result.cause import Cause, Group
+from drivetwin.estimation.result.cause import LEAD, Cause, Group
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.spread import EXPLAINED
 from drivetwin.findings import Code, Finding, report
@@ -29,9 +29,6 @@ from drivetwin.vehicle.effects import EffectId
 class CauseSettings:
     """Settings of the naming of causes."""
 
-    least_evidence: float = 5.0
-    """Log evidence beyond that of one cause among all from which it is named: odds of 150 to 1
-    against chance, where each of N causes has the prior odds 1/N."""
     equivalent: float = 0.9
     """Cosine between the fitted effects of two causes, the unknowns adjusted, from which the log
     cannot tell them apart."""
@@ -45,7 +42,8 @@ CAUSES = CauseSettings()
 
 
 def find_cause(correction: Correction, fit: LikelihoodFit) -> Cause | None:
-    """Find the cause with most evidence; None if none has enough.
+    """Find the cause with most evidence; None if it has less than `LEAD` among N causes, each with
+    the prior odds 1/N.
 
     Stated sensor tolerances are no candidates: they are expected to act. The cause explains the log
     only if `fit` and its correction do, and its size is plausible.
@@ -54,7 +52,7 @@ def find_cause(correction: Correction, fit: LikelihoodFit) -> Cause | None:
         ((group, one) for group, one in correction.evidence.items() if group.effect is not None),
         key=lambda pair: -pair[1].nats,
     )
-    if not ranked or ranked[0][1].nats < CAUSES.least_evidence + np.log(len(ranked)):
+    if not ranked or ranked[0][1].nats < LEAD + np.log(len(ranked)):
         return None
     group, best = ranked[0]
     similar = {other for other, one in ranked[1:] if _compute_cosine(best, one) > CAUSES.equivalent}

@@ -15,11 +15,7 @@ from drivetwin.estimation.likelihood.effects.joint_step import (
     weight_columns,
 )
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.result.cause import Group
-
-SHOWN = 3.0
-"""Log evidence from which an effect moves the values: odds of 20. Effects with less widen the
-intervals, and the values stay those that simulate best without them."""
+from drivetwin.estimation.result.cause import SHOWN, Group
 
 
 @dataclass(frozen=True, eq=False)

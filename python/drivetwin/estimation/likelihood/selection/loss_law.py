@@ -14,13 +14,14 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.optimize.gauss_newton import solve_step
+from drivetwin.estimation.result.cause import LEAD
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 
 OTHER: dict[LossLaw, LossLaw] = {"paper": "dissipative", "dissipative": "paper"}
-RULED_OUT = 10.0
+RULED_OUT = 2.0 * LEAD
 """Rise of Q from which a model has no support beside another (Burnham and Anderson 2002)."""
 
 

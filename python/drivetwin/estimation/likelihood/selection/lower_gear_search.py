@@ -10,18 +10,23 @@ whole oscillation of the shaft, and pedal steps before the shift show it alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
-from drivetwin.estimation.likelihood.effects.plant_refit import compare_plants, extend_problem
+from drivetwin.estimation.likelihood.effects.shaft import ROUNDING
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.optimize.staged_start import (
     find_staged_start,
     fit_lower_gear_only,
+)
+from drivetwin.estimation.likelihood.selection.plants import (
+    compare_plants,
+    extend_problem,
+    list_starts,
 )
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS, refit_best_mode
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
@@ -31,23 +36,9 @@ from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue
 
-
-@dataclass(frozen=True)
-class LowerGearSettings:
-    """Settings of the search from the lower gear."""
-
-    reversal: float = 0.03
-    """Torque on either side of zero, over the largest, from which it counts as reversed: the
-    rounding of its sign [-]."""
-    sizes: tuple[float, ...] = (0.02, 0.06)
-    """Sizes of the starts: on either side of the usual one, half a gap times k_o over the largest
-    torque [-]."""
-    max_work: float = 5000.0
-    """Work of the search with one plant: it takes 600 for the dual clutch and 2500 with backlash
-    [passes]."""
-
-
-LOWER_GEAR = LowerGearSettings()
+MAX_WORK = 5000.0
+"""Work of the search with one plant: it takes 600 for the dual clutch and 2500 with backlash
+[passes]."""
 MODES = (frozenset[str](), frozenset(SPEEDS), frozenset((*SPEEDS, OUTPUT_TORQUE)))
 """Sampling modes that are tried: as read, speeds as means, all outputs as means."""
 
@@ -74,19 +65,20 @@ def fit_with_backlash(
     if not _is_reversed(problem):
         return None
     extended, point = extend_problem(problem, start, EffectId.BACKLASH, priors)
-    sizes = [np.append(start.values, np.log(size)) for size in LOWER_GEAR.sizes]
-    found = _search(extended, [point.replace_values(one) for one in sizes], shifts)
+    starts = [np.append(start.values, one) for one in list_starts(EffectId.BACKLASH, priors[0])]
+    found = _search(extended, [point.replace_values(one) for one in starts], shifts)
     return None if found is None else replace(found, plant=_compare(found, priors))
 
 
 def _is_reversed(problem: ShiftObjective) -> bool:
-    """Return whether the measured output torque goes to either side of zero."""
+    """Return whether the measured output torque goes to either side of zero, beyond the rounding
+    of its sign."""
     outputs = [out for part in problem.parts for out in part.record.outputs]
     torques = [out.values for out in outputs if out.name == OUTPUT_TORQUE]
     if not torques:
         return False
     low, high = min(map(np.min, torques)), max(map(np.max, torques))
-    least = LOWER_GEAR.reversal * max(abs(low), abs(high))
+    least = ROUNDING * max(abs(low), abs(high))
     return bool(low < -least and high > least)
 
 
@@ -96,7 +88,7 @@ def _search(
     """Search from the fits of the lower gear, the best first; None where none leads to a minimum or
     the work runs out."""
     try:
-        with limit_evaluations(LOWER_GEAR.max_work):
+        with limit_evaluations(MAX_WORK):
             for of_modes, point in _fit_lower_gears(problem, starts, shifts):
                 near = find_staged_start(of_modes, point, shifts)
                 found = None if near is None else fit_local(of_modes, near.point)
@@ -139,4 +131,4 @@ def _compare(found: LikelihoodFit, priors: Sequence[PriorValue]) -> PlantEvidenc
     if other is None:
         nats = 0.5 * (MULTI_START.far_chi2 * found.problem.size - found.normal.cost)
         return PlantEvidence(EffectId.BACKLASH, nats, np.zeros_like(found.point.values), count)
-    return compare_plants(other, found, found.chi2, priors)
+    return compare_plants(other, found, EffectId.BACKLASH, found.chi2, priors)

@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: MIT
 """Model selection by the log: growth and variation of the load, sampling mode of the outputs.
 
-A part of the model that is wrongly left out biases everything (a load that grows with speed moves
-J3 by several per cent), and one that is wrongly left in widens intervals. The growing part is
-kept where it is significant (aero_load.py); where it is not, the effect of that name widens the
-intervals. Each shift has its own load unless one common load is consistent (per_shift_load.py).
-Outputs are samples or means, whichever gives the smaller residual (sampling_mode.py).
+A term of the model that is wrongly left out biases everything (a load that grows with speed moves
+J3 by several per cent), and one that is wrongly left in widens intervals. The log decides by its
+evidence (candidates.py). Outputs are samples or means, whichever gives the smaller residual
+(sampling_mode.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
-from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
+from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
-from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
     NoConvergence,
@@ -29,8 +29,12 @@ from drivetwin.estimation.likelihood.optimize.multistart import (
     refine,
 )
 from drivetwin.estimation.likelihood.priors import build_problem
-from drivetwin.estimation.likelihood.selection import aero_load
-from drivetwin.estimation.likelihood.selection.per_shift_load import fit_common_load
+from drivetwin.estimation.likelihood.selection.candidates import (
+    GROWING_LOAD,
+    LOAD_OF_EACH_SHIFT,
+    find_absent_terms,
+    try_minima,
+)
 from drivetwin.estimation.likelihood.selection.sampling_mode import (
     average_modes,
     refit_best_mode,
@@ -40,10 +44,10 @@ from drivetwin.estimation.likelihood.selection.sampling_mode import (
     select_sampling_mode,
     widen_over_modes,
 )
-from drivetwin.estimation.likelihood.selection.touch_point_minima import find_best_minimum
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.result.estimate_set import report_growth
 from drivetwin.findings import Finding
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import LossLaw
@@ -55,15 +59,9 @@ class SelectionSettings:
 
     max_work: float = 700.0
     """Work of the search: one from a bad start takes 450 passes [passes]."""
-    max_restricted_work: float = 200.0
+    max_restricted_work: float = MAX_REFIT_WORK
     """Work of the search that starts from a minimum of the wider model: it takes 160 passes
     [passes]."""
-    max_touch_point_work: float = 400.0
-    """Work on other minima of an element that stays about P0, at most what the search has left:
-    each takes about 100 passes [passes]."""
-    max_sampling_mode_work: float = 400.0
-    """Work on sampling modes that the log hardly distinguishes, at most what the search has left:
-    each takes about 100 passes [passes]."""
     min_aero: float = 1e-3
     """Initial growing part of the load; at zero it has no derivative [N m s^2/rad^2]."""
 
@@ -96,27 +94,27 @@ def select_model(
         best = fit_candidates(problem, start, shifts)
     with (
         _STAGES.enter("slow outputs", "kinds of signals"),
-        limit_evaluations(SELECTION.max_sampling_mode_work),
+        limit_evaluations(MAX_REFIT_WORK),
     ):
         best = refit_slow_outputs(problem, best)
     with _STAGES.enter("restriction"), limit_evaluations(SELECTION.max_restricted_work):
-        level = fit_common_load(best)
-        point, covariance = level or (best.point, best.covariance)
-        guess = growing if aero_load.is_significant(point, covariance) else constant
-        narrower = build_problem(signals, drivelines, loss_law, guess, hilly=level is None)
+        absent, point = find_absent_terms(best)
+        guess = constant if GROWING_LOAD in absent else growing
+        hilly = LOAD_OF_EACH_SHIFT not in absent
+        narrower = build_problem(signals, drivelines, loss_law, guess, hilly=hilly)
         best, problem = _restrict(best, point, narrower, shifts) or (best, problem)
-    notes = aero_load.report_aero_load(best)
+    notes = _report_growth(best)
     with (
         _STAGES.enter("minima", "other minima"),
-        limit_evaluations(min(SELECTION.max_touch_point_work, search.left)),
+        limit_evaluations(min(MAX_REFIT_WORK, search.left)),
     ):
-        best = find_best_minimum(problem, best)
+        best = try_minima(best, problem)
     with (
         _STAGES.enter("averaging", "kinds of signals"),
-        limit_evaluations(min(SELECTION.max_sampling_mode_work, search.left)),
+        limit_evaluations(min(MAX_REFIT_WORK, search.left)),
     ):
         best, doubts = _average_modes(problem, best, priors)
-    with _STAGES.enter("other outputs"), limit_evaluations(SELECTION.max_sampling_mode_work):
+    with _STAGES.enter("other outputs"), limit_evaluations(MAX_REFIT_WORK):
         best, either = widen_over_modes(problem, best)
     return best, (*notes, *report_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
 
@@ -150,7 +148,7 @@ def _restrict(
     if not left_out:
         return None
     if left_out == [AERO] and wider.point[AERO] == 0.0:
-        return aero_load.drop_growth(wider, problem), problem
+        return _drop_unknown(wider, problem, AERO), problem
     try:
         of_kinds = problem.select_modes(wider.problem.kinds)
         return fit_multistart(of_kinds, _copy_values(start, point), shifts, thorough=False), problem
@@ -195,3 +193,53 @@ def _copy_values(start: ParameterVector, found: ParameterVector) -> ParameterVec
     """Copy the values of `found` into `start` for the names that it has."""
     values = [found[n] if n in found.names else start[n] for n in start.names]
     return start.replace_values(np.array(values))
+
+
+def _report_growth(best: LikelihoodFit) -> list[Finding]:
+    """Report a load that grows with speed; empty if it does not."""
+    if AERO not in best.point.names:
+        return []
+    k = best.point.names.index(AERO)
+    std = float(np.sqrt(best.covariance[k, k]))
+    return [report_growth(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
+
+
+def _drop_unknown(best: LikelihoodFit, narrower: ShiftObjective, name: str) -> LikelihoodFit:
+    """Return the fit of the model without an unknown, where that of the wider one has zero for it.
+
+    It is the same minimum. An unknown at its bound has no place in the covariance: it would widen
+    the interval of T_v/i_f, with which the growth of the load nearly goes, by what it cannot be.
+    """
+    k = best.point.names.index(name)
+    point, normal = _drop_value(best.point, k), best.normal
+    parts = [
+        replace(part, structure=other.structure)
+        for part, other in zip(best.problem.parts, narrower.parts, strict=True)
+    ]
+    normal = replace(
+        normal,
+        gradient=np.delete(normal.gradient, k),
+        information=_drop_row(normal.information, k),
+        data=_drop_row(normal.data, k),
+        regressors=tuple(np.delete(one, k, axis=1) for one in normal.regressors),
+        slopes=tuple(np.delete(one, k, axis=1) for one in normal.slopes),
+    )
+    problem = replace(narrower, parts=tuple(parts))
+    return replace(
+        best,
+        problem=problem,
+        point=point,
+        mean=_drop_value(best.mean, k),
+        covariance=compute_covariance(problem, normal, best.chi2),
+        normal=normal,
+    )
+
+
+def _drop_value(point: ParameterVector, k: int) -> ParameterVector:
+    """Return the point without its unknown number k."""
+    return ParameterVector((*point.names[:k], *point.names[k + 1 :]), np.delete(point.values, k))
+
+
+def _drop_row(matrix: FloatArray, k: int) -> FloatArray:
+    """Return a matrix (p, p) without row and column k."""
+    return np.delete(np.delete(matrix, k, axis=0), k, axis=1)

@@ -10,7 +10,6 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import Correction
-from drivetwin.estimation.likelihood.effects.expansion import SHOWN
 from drivetwin.estimation.likelihood.effects.friction import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -18,7 +17,7 @@ from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.likelihood.slip_contact import find_loaded_slips
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import differentiate
 from drivetwin.estimation.linear.friction_points import build_law_derivatives, evaluate_stribeck
-from drivetwin.estimation.result.cause import Group
+from drivetwin.estimation.result.cause import SHOWN, Group
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.findings import Code, explain
 from drivetwin.simulation.dual_clutch import Stribeck

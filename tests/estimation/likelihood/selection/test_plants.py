@@ -11,17 +11,14 @@ import pytest
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors, build_columns
-from drivetwin.estimation.likelihood.effects.plant_refit import (
-    PLANT,
-    build_plant_priors,
-    extend_problem,
-    select_plant,
-)
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
-from drivetwin.estimation.result.cause import Group
+from drivetwin.estimation.likelihood.plant_effect import PLANTS
+from drivetwin.estimation.likelihood.selection.candidates import try_plants
+from drivetwin.estimation.likelihood.selection.plants import build_plant_priors, extend_problem
+from drivetwin.estimation.result.cause import LEAD, Group
 from drivetwin.findings import Code
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem
@@ -48,10 +45,10 @@ def _count_deviations(fit: LikelihoodFit, name: str, truth: float) -> float:
 
 def test_a_mode_of_the_input_side_is_found_and_the_stiffness_is_true() -> None:
     made, plain = swinging()
-    found = select_plant(plain, EffectPriors())
+    found = try_plants(plain, EffectPriors())
     assert found.plant is not None
     assert found.plant.effect is MODE
-    assert found.plant.nats > PLANT.evidence
+    assert found.plant.nats > LEAD
     index = found.plant.index
     std = np.sqrt(found.covariance[index, index])
     assert abs(found.point.values[index] - np.log(FREQUENCY)) < 3.0 * std
@@ -64,7 +61,7 @@ def test_a_mode_of_the_input_side_is_found_and_the_stiffness_is_true() -> None:
 def test_a_part_of_the_plant_is_named_and_reported_as_parameters() -> None:
     made, plain = swinging()
     found = build_estimates(
-        select_plant(plain, EffectPriors()), [made.signals], [made.driveline], {}, EffectPriors()
+        try_plants(plain, EffectPriors()), [made.signals], [made.driveline], {}, EffectPriors()
     )
     assert found.cause is not None
     assert found.cause.in_plant
@@ -75,12 +72,12 @@ def test_a_part_of_the_plant_is_named_and_reported_as_parameters() -> None:
     assert abs(frequency.value - FREQUENCY) < 3.0 * frequency.std_total
     share = found.estimates["mode_share"]
     assert share.std_total is not None
-    assert share.std_total < PLANT.share_std
+    assert share.std_total < PLANTS[MODE].shape["share"].std
 
 
 def test_a_log_without_a_mode_keeps_the_dual_clutch_and_widens() -> None:
     plain = fitted()
-    found = select_plant(plain, EffectPriors())
+    found = try_plants(plain, EffectPriors())
     assert found.plant is None
     assert np.array_equal(found.point.values, plain.point.values)
     std = np.sqrt(np.diag(plain.covariance))
@@ -112,7 +109,7 @@ def test_a_stated_effect_in_the_plant_has_no_column(monkeypatch: pytest.MonkeyPa
 
 def test_a_mode_that_is_off_is_not_tried() -> None:
     _, plain = swinging()
-    assert select_plant(plain, EffectPriors({MODE: EffectPrior(0.0)})) is plain
+    assert try_plants(plain, EffectPriors({MODE: EffectPrior(0.0)})) is plain
 
 
 TYRE = EffectId.TYRE_SLIP
@@ -130,7 +127,7 @@ def slipping() -> tuple[Bench, LikelihoodFit]:
 def test_a_large_slip_of_the_tyres_is_estimated_in_the_plant() -> None:
     """Its column at the minimum of the dual clutch leaves a fifth of the noise."""
     made, plain = slipping()
-    found = select_plant(plain, EffectPriors())
+    found = try_plants(plain, EffectPriors())
     assert plain.chi2 > 1.15
     assert found.chi2 < 1.02
     assert found.plant is not None
@@ -146,4 +143,4 @@ def test_a_part_that_its_columns_describe_as_well_stays_out_of_the_plant() -> No
     made = record_bench(scenario, 0, ROUGH, effects={EffectId.PROGRESSIVE_SHAFT: 0.05})
     posed, start = problem(made)
     plain = fit_multistart(posed, start, [made.signals.shift])
-    assert select_plant(plain, EffectPriors()).plant is None
+    assert try_plants(plain, EffectPriors()).plant is None

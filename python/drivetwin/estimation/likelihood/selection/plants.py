@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""Fits of plants with an element beside the dual clutch.
+
+Where an effect changes the motion much, no column at the minimum of the dual clutch describes it:
+a mode of the input side is absorbed by k_o before it shows. Such an effect is put into the plant
+(`PLANTS`) and the fit repeated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import log
+
+import numpy as np
+
+from drivetwin.estimation.data.shift_data import KnownDriveline
+from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
+from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.likelihood.effects.joint_step import SIZES
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence, compute_covariance
+from drivetwin.estimation.likelihood.plant_effect import PLANTS, PlantEffect
+from drivetwin.estimation.likelihood.selection.model_comparison import Minimum, compute_evidence
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.vehicle.effects import EffectId, EffectPrior
+from drivetwin.vehicle.spec import PriorValue
+
+_LEAST_SPREAD = 1e-3
+"""Least prior standard deviation of a size that is stated exactly, over the size [-]."""
+
+
+def build_plant_priors(
+    effect: EffectId, priors: EffectPriors, driveline: KnownDriveline, amount: float = 1.0
+) -> tuple[PriorValue, ...]:
+    """Build the priors of the unknowns of an added element.
+
+    The logarithm of a size is about its stated value, else about its usual one. The spread of a
+    signed size grows to the `amount` [prior standard deviations] that its columns show, as the
+    prior of the amount does by the evidence.
+    """
+    row, prior = PLANTS[effect], priors.get_prior(effect, driveline)
+    if row.signed:
+        spread = max(prior.std * max(1.0, abs(amount)), _LEAST_SPREAD * abs(prior.value))
+        return (PriorValue(prior.value, spread), *row.shape.values())
+    return (_build_size_prior(prior, row.spread or SIZES.spread), *row.shape.values())
+
+
+def _build_size_prior(prior: EffectPrior, spread: float) -> PriorValue:
+    if not prior.value:
+        return PriorValue(log(prior.std), spread)
+    size = abs(prior.value)
+    return PriorValue(log(size), max(prior.std / size, _LEAST_SPREAD))
+
+
+def list_starts(effect: EffectId, prior: PriorValue) -> list[float]:
+    """Return the initial values of the first unknown where no column shows one."""
+    return [prior.value + start * prior.std for start in PLANTS[effect].starts]
+
+
+def extend_problem(
+    problem: ShiftObjective,
+    point: ParameterVector,
+    effect: EffectId,
+    priors: Sequence[PriorValue],
+) -> tuple[ShiftObjective, ParameterVector]:
+    """Add an effect to the plant; its unknowns come last, at the means of their `priors`."""
+    outputs = [out for part in problem.parts for out in part.record.outputs]
+    full = max(float(np.max(np.abs(o.values))) for o in outputs if o.name == OUTPUT_TORQUE)
+    own = PlantEffect(effect, full)
+    values = np.append(point.values, [one.value for one in priors])
+    extended = ParameterVector((*point.names, *own.unknowns), values)
+    return problem.extend(own, priors), extended
+
+
+def refit_plant(
+    fit: LikelihoodFit,
+    effect: EffectId,
+    priors: Sequence[PriorValue],
+    start: float,
+) -> LikelihoodFit | None:
+    """Fit with an effect in the plant, with the weighting of `fit`; None without a minimum.
+
+    `start` is the first unknown of the element.
+    """
+    problem, point = extend_problem(fit.problem, fit.point, effect, priors)
+    values, index = point.values.copy(), fit.point.values.size
+    values[index] = start
+    try:
+        with limit_evaluations(MAX_REFIT_WORK):
+            found = minimise(problem, point.replace_values(values))
+    except BudgetExceeded:
+        return None
+    if found is None or not found.converged:
+        return None
+    return _build_fit(fit, found, compare_plants(fit, found, effect, fit.chi2, priors))
+
+
+def compare_plants(
+    plain: Minimum,
+    extended: Minimum,
+    effect: EffectId,
+    chi2: float,
+    priors: Sequence[PriorValue],
+) -> PlantEvidence:
+    """Compare the minimum of an extended plant with that of the dual clutch.
+
+    `chi2` is the residual power per sample, `priors` are those of the unknowns of the element.
+    """
+    index = plain.point.values.size
+    moves = extended.point.values[:index] - plain.point.values
+    return PlantEvidence(
+        effect,
+        compute_evidence(plain, extended, chi2, priors),
+        np.append(moves, np.zeros(len(priors))),
+        index,
+    )
+
+
+def _build_fit(
+    fit: LikelihoodFit, found: OptimizeResult[ShiftObjective], plant: PlantEvidence
+) -> LikelihoodFit:
+    """Build the fit of an extended plant; it has the average over sampling modes of `fit`."""
+    problem, point, normal = found.problem, found.point, found.normal
+    chi2 = (normal.cost - problem.prior.compute_prior_cost(point.values)) / problem.size
+    own, added = fit.covariance - fit.noise_covariance, point.values.size - plant.index
+    values = point.values + np.append(fit.mean.values - fit.point.values, np.zeros(added))
+    return LikelihoodFit(
+        problem,
+        point,
+        point.replace_values(np.clip(values, problem.lower, problem.upper)),
+        compute_covariance(problem, normal, chi2) + np.pad(own, (0, added)),
+        normal,
+        chi2,
+        found.iterations,
+        plant,
+    )
