@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.estimation.study import START_INERTIA, fit_likelihood, read_fit
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.linear.multi_shift import apply_sensor_error
+from drivetwin.estimation.linear.estimates import apply_sensor_error
 from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.support.bench import Bench, Knowledge, record_bench

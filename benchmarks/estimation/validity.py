@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from drivetwin.estimation.likelihood.effects.torques import REFERENCE_TORQUE
 
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch_log
 from benchmarks.estimation.rough_count import FAR, compute_kept
@@ -23,7 +24,6 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.causes import CAUSES
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
-from drivetwin.estimation.likelihood.effects.gearbox import REFERENCE_TORQUE
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Identification from logs, a vehicle card and detected shifts: prepare, then estimate."""
+"""Identification from logs, a vehicle card and detected shifts: prepare, then estimate.
+
+Checks of logs that are to be fitted together.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+import numpy as np
+
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, Where
 from drivetwin.estimation.data.actuators import (
     FoundActuators,
     LogShifts,
     identify_actuators,
 )
-from drivetwin.estimation.data.compare_logs import require_compatible
 from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
@@ -27,6 +31,38 @@ from drivetwin.plausibility.check import check_card
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.vehicle.locks import apply_locks, collect_locks
 from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+def require_compatible(logs: Sequence[ShiftLog]) -> None:
+    """Raise InputError for logs that cannot take part in one fit."""
+    for k, one in enumerate(logs):
+        for other in logs[:k]:
+            if is_same_recording(one, other):
+                raise InputError(
+                    f"the same recording as {other.source}: counted twice, its noise would seem "
+                    "smaller than it is",
+                    "name each log once",
+                    Where(file=one.source),
+                )
+    without = [log.source for log in logs if "output_torque" not in log]
+    if without and len(without) < len(logs):
+        raise InputError(
+            f"{', '.join(without)} without an output torque among logs that have one: the former "
+            "determine torques over η only, the latter torques themselves",
+            "map the sensor as 'output_torque', or identify the two kinds apart",
+            Where(file=without[0]),
+        )
+
+
+def is_same_recording(one: ShiftLog, other: ShiftLog) -> bool:
+    """Return whether two logs are the same recording, even in two formats."""
+    if one.sha256 == other.sha256:
+        return True
+    common = [role for role in one.channels if role in other]
+    return bool(common) and all(
+        np.array_equal(one[role].values, other[role].values) for role in common
+    )
+
 
 _STAGES = ("preparation", "estimation")
 _BY_METHOD = {one: TimedStages(f"{one.value} identification", _STAGES) for one in Method}

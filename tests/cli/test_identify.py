@@ -15,7 +15,7 @@ import pytest
 from drivetwin.cli import identify as identify_command
 from drivetwin.cli import main
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from tests.cli.conftest import Files
 
 

@@ -18,7 +18,7 @@ from drivetwin.observer.observe import estimate_torques
 from drivetwin.observer.result import Band, Observation
 from drivetwin.shifts.detect import FoundShifts
 from tests.observer.conftest import Bench, bench
-from tests.shifts.test_split_gears import CHAIN
+from tests.shifts.test_shift_split_gears import CHAIN
 
 __all__ = ["bench"]
 

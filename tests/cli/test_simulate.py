@@ -15,7 +15,7 @@ from drivetwin.logs.read import read_raw
 from drivetwin.shifts.shift import Shift
 from drivetwin.validation.simulate_log import format_signals, simulate_shift
 from tests.observer.conftest import Bench, bench
-from tests.shifts.test_split_gears import CHAIN
+from tests.shifts.test_shift_split_gears import CHAIN
 
 __all__ = ["bench"]
 

@@ -16,7 +16,7 @@ from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import InputError
-from drivetwin.estimation.likelihood.effects.random_walk import WalkStream, draw_walk
+from drivetwin.estimation.likelihood.effects.effect import WalkStream, draw_walk
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import compute_friction_work
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.simulation.dual_clutch import FloatArray, Trajectory

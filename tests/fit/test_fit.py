@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code
 from drivetwin.fit.fit import build_problem, fit_network
 from drivetwin.fit.network_model import NetworkModel

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.agreement import compute_fit
-from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.validation import SignalTrace, Validation
+from drivetwin.estimation.result.validation import SignalTrace, Validation, compute_fit
 from drivetwin.findings import Code, report
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory

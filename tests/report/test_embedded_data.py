@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from drivetwin.estimation.result.estimate import FloatArray
+from drivetwin._util.arrays import FloatArray
 from drivetwin.report.embedded_data import NOISE_PARTS, SPAN_PARTS, Store
 
 

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.estimation.artifacts import StageResults
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.findings import render
 from drivetwin.report.blocks import FigureBlock, Section
 from drivetwin.report.html import build_report_sections, render_report, save_report

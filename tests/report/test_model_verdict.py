@@ -9,7 +9,7 @@ import pytest
 
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.result_file import ResultFile
 from drivetwin.findings import Code, Finding, explain, report
 from drivetwin.report.model_verdict import ModelVerdict, explain_identification, explain_result

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity
-from drivetwin.estimation.artifacts import StageResults
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.report.notebook import draw_figure, summarise
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_fit

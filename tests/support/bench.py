@@ -11,7 +11,7 @@ from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.estimation.data.prepare_signal import prepare_signal
+from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
     ShiftElementKinematics,

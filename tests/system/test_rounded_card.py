@@ -13,7 +13,7 @@ import drivetwin
 from benchmarks.estimation.validity import identify_validated
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code
 
 CASE = Path(__file__).resolve().parents[3] / "shared" / "cases" / "rounded_card"

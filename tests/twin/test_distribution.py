@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.estimation.result.joint import JointCovariance
+from drivetwin.estimation.result.estimate_set import JointCovariance
 from drivetwin.parameters import LAW_KEYS, make_law_id
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.build import build_twin

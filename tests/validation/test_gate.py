@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.estimation.artifacts import StageResults
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, StageResults
+from drivetwin.estimation.result.cause import PredictedSpread
 from drivetwin.estimation.result.estimate import SignalFit, Verdict
-from drivetwin.estimation.result.spread import PredictedSpread
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code, report
 from drivetwin.validation.gate import assess_model
 from drivetwin.vehicle.spec import PriorValue

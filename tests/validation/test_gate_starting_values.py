@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.verdict import from_prior
 from drivetwin.findings import Code
 from drivetwin.validation.gate import assess_model, withhold_starting_values

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from drivetwin.errors import Where
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code, Finding, make_row
 from drivetwin.report.model_verdict import explain_identification
 from drivetwin.validation.gate import find_undetermined_gains

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import DamagedChannelError
-from drivetwin.estimation.result.agreement import compute_fit
-from drivetwin.estimation.result.estimate import Estimate, FloatArray, FrictionCurve, Verdict
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.validation import compute_fit
 from drivetwin.findings import render
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Stribeck

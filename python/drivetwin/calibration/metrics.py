@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfilt
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.shifts.metrics import compute_rates, compute_vibration_doses
+from drivetwin.shifts.quality import compute_rates, compute_vibration_doses
 from drivetwin.simulation.driveline import SHAFT
 from drivetwin.simulation.network import Output
 

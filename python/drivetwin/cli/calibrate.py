@@ -297,7 +297,7 @@ def _divide(first: float, last: float, count: int) -> tuple[float, ...]:
 
 def _load_valid_twin(source: Path) -> Twin:
     """Load a twin; raises IdentificationError where its result says that it is not valid."""
-    from drivetwin.estimation.result.status import ModelStatus
+    from drivetwin.estimation.result.method import ModelStatus
     from drivetwin.files.result_file import load_result
     from drivetwin.files.twin_file import load_twin
     from drivetwin.report.model_verdict import explain_result

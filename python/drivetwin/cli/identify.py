@@ -16,7 +16,7 @@ from drivetwin.cli.atomic_outputs import refuse_same_names
 from drivetwin.cli.identify_run import IdentifyOptions
 from drivetwin.cli.output import print_blocks, print_json, print_line, show_error, to_error_document
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 
 if TYPE_CHECKING:
     from drivetwin.estimation.identification import Identification

@@ -109,7 +109,7 @@ def collect_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
     import numpy as np
 
     from drivetwin.logs.raw import RawChannel
-    from drivetwin.shifts.split_gears import compute_exclusive_masks
+    from drivetwin.shifts.shift import compute_exclusive_masks
 
     own = compute_exclusive_masks([one.shift for one in found], [one.time for one in found])
     parts: dict[str, list[tuple[Any, Any]]] = {}

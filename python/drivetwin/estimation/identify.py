@@ -11,20 +11,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError, Where
-from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import DesignData, PreparedLog, ShiftSignals
-from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.linear.multi_shift import add_tolerances, estimate_integral
+from drivetwin.estimation.identification import Identification, StageResults
+from drivetwin.estimation.linear.estimates import add_tolerances, estimate_integral
 from drivetwin.estimation.paper.pipeline import (
     PaperShift,
     assess_paper_shifts,
     identify_paper_shift,
 )
-from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.friction_verdict import complete_friction, report_assumed_gains
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method

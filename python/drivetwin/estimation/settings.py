@@ -7,13 +7,13 @@ from dataclasses import asdict
 from typing import Any
 
 from drivetwin.estimation.data import noise, segments, select_shifts
-from drivetwin.estimation.likelihood import coloured_noise, objective
+from drivetwin.estimation.likelihood import coloured_noise, objective, priors
 from drivetwin.estimation.likelihood import pipeline as likelihood
-from drivetwin.estimation.likelihood.data import input_smoothing, shift_record, slipping_elements
-from drivetwin.estimation.likelihood.effects import causes, correction, joint_step, withdrawal
+from drivetwin.estimation.likelihood.data import input_smoothing, shift_record
+from drivetwin.estimation.likelihood.effects import causes, correction, joint_step
 from drivetwin.estimation.likelihood.noise import residual_covariance
 from drivetwin.estimation.likelihood.optimize import (
-    initial_guess_without_torque,
+    initial_guess,
     multistart,
     staged_start,
 )
@@ -26,18 +26,18 @@ from drivetwin.estimation.linear import (
     ringdown,
 )
 from drivetwin.estimation.optimize import gauss_newton
-from drivetwin.estimation.result import multi_log, prior_update, verdict
+from drivetwin.estimation.result import multi_log, prior_conflict, verdict
 from drivetwin.estimation.result.method import Method
 
 _LINEAR = (
     *(noise, select_shifts, segments, momentum_balance, load_balance, ringdown, friction_points),
-    *(combine_shifts, gauss_newton, estimates, verdict, prior_update),
+    *(combine_shifts, gauss_newton, estimates, verdict, prior_conflict),
 )
 """Stages of the integral method, with which the likelihood method starts."""
 _LIKELIHOOD = (
-    *(likelihood, shift_record, input_smoothing, slipping_elements, initial_guess_without_torque),
+    *(likelihood, shift_record, input_smoothing, priors, initial_guess),
     *(staged_start, multistart, objective, residual_covariance, coloured_noise),
-    *(causes, joint_step, correction, withdrawal, multi_log),
+    *(causes, joint_step, correction, multi_log),
 )
 """Stages that the likelihood method adds."""
 

@@ -11,7 +11,7 @@ from pydantic import Field, FiniteFloat
 
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.records import (
     FindingRecord,
     FitRecord,

@@ -23,6 +23,7 @@ from pydantic import (
     model_validator,
 )
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.plain_values import convert_nonfinite
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin._util.toml import raise_faults, validate_schema

@@ -12,7 +12,7 @@ from drivetwin.channels.mapping import make_spec
 from drivetwin.channels.read_options import Column
 from drivetwin.channels.recognition import find_candidates
 from drivetwin.errors import MappingError, MissingChannelError, Where
-from drivetwin.estimation.data.prepare_signal import prepare_signal
+from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.findings import Finding
 from drivetwin.fit.model_file import ModelChannels
 from drivetwin.fit.network_model import NetworkModel

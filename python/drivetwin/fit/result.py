@@ -20,7 +20,7 @@ from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.verdict import (
     VERDICT,
     apply_errors,

@@ -12,9 +12,9 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
-from drivetwin.estimation.likelihood.noise.linear_response import LinearResponse
 from drivetwin.estimation.likelihood.noise.residual_covariance import (
     InputNoise,
+    LinearResponse,
     SeenOutput,
     Whitener,
     add_input_noise,
@@ -22,7 +22,6 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
 )
 from drivetwin.estimation.likelihood.objective import OBJECTIVE
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.result.agreement import compute_fit
 from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.fit.recording import NetworkRecord
 from drivetwin.fit.unknown import SoughtNumber

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivetwin.estimation.result.estimate import FloatArray, FrictionCurve
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
 

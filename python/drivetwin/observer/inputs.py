@@ -11,8 +11,8 @@ import numpy as np
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingParameterError, Where
+from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.prepare import collect_pressures
-from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.observer.linear_model import BoolArray, Course

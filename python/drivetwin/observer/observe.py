@@ -16,8 +16,8 @@ import numpy as np
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, SimulationError
+from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.prepare import collect_pressures
-from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.findings import render
 from drivetwin.observer.inputs import select_uncertain

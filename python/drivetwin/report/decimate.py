@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.estimation.result.estimate import FloatArray
+from drivetwin._util.arrays import FloatArray
 
 MAX_POINTS = 4000
 _OUTSIDE = 600

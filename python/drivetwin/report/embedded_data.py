@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.estimation.result.estimate import FloatArray
+from drivetwin._util.arrays import FloatArray
 
 NOISE_PARTS = 16.0
 SPAN_PARTS = 65536.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from drivetwin._util.display_units import format_significant
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.verdict import get_experiment
 from drivetwin.files.result_file import ResultFile
 from drivetwin.findings import Code, Finding, Severity, explain, report

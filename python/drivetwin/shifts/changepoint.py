@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.minimize_bounded import minimize_bounded
-
-FloatArray = NDArray[np.float64]
 
 _GRID = 80
 """Hinges compared before the best one is refined."""

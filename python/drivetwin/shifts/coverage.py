@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.arrays import Span
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.errors import DamagedChannelError, Where
@@ -23,8 +24,6 @@ from drivetwin.findings import Code, report
 from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, find_open_spans
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue
-
-Span = tuple[float, float]
 
 OLDEST, YOUNGEST = 0.08, 0.02
 """A stamp of the engine torque shows an instant so much earlier at most, or so much later [s]."""

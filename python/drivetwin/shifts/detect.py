@@ -7,24 +7,21 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
 from drivetwin.shifts.candidate import (
     CandidateRefusedError,
+    Run,
     Search,
     build_shift,
     compute_ratio,
     describe_gears,
+    detect_gear_runs,
     find_resting_ratio,
 )
-from drivetwin.shifts.gear_runs import Run, detect_gear_runs
-from drivetwin.shifts.kinematics import (
-    FloatArray,
-    GearboxSpeeds,
-    compute_gear_ratios,
-    resample_speeds,
-)
+from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.settings import ShiftSettings
 from drivetwin.shifts.shift import RejectedShift, Shift

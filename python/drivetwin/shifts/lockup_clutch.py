@@ -13,16 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.signal_processing import compute_moving_mean, find_true_runs
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.findings import Code, Finding, report
-from drivetwin.shifts.kinematics import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.tcu_flags import find_flag_spans
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
-Span = tuple[float, float]
 BoolArray = NDArray[np.bool_]
 
 TURBINE_TORQUE = "turbine torque"

@@ -8,12 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin._util.arrays import Span
 from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import RejectedShift, Shift
-
-Span = tuple[float, float]
 
 _GLITCH = 0.05
 """A flag that changes for a shorter time [s] than this was sent wrongly, or by another sender."""

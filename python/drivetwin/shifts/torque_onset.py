@@ -6,14 +6,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.shifts.breakaway_lockup import Boundary
 from drivetwin.shifts.changepoint import Moving, fit_hinge
-
-FloatArray = NDArray[np.float64]
 
 SMOOTH = 0.01
 """Span [s] that pressures and torque are averaged over."""

@@ -10,17 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.errors import InputError, MissingParameterError, Where
-from drivetwin.estimation.result.estimate import (
-    Estimate,
-    FloatArray,
-    FrictionCurve,
-    LoadLaw,
-    Verdict,
-)
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, make_ratio_id
 from drivetwin.shifts.shift import Shift

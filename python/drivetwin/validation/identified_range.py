@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import Where
-from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.simulation.dual_clutch import Trajectory
 

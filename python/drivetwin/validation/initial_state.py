@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, Where
 from drivetwin.estimation.data.noise import estimate_white_noise
-from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, State
 

@@ -26,8 +26,7 @@ from drivetwin.pipeline import identify, identify_jointly
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.lockup_clutch import refer_to_turbine, require_locked_converter
-from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.split_gears import split_shared_gears
+from drivetwin.shifts.shift import Shift, split_shared_gears
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import attach_fit, attach_validation, simulate_shift

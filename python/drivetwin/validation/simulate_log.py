@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.pressure_roles import make_pressure_role
@@ -15,15 +16,13 @@ from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.agreement import compute_fit
-from drivetwin.estimation.result.estimate import FloatArray, SignalFit
-from drivetwin.estimation.result.validation import SignalTrace, Validation
+from drivetwin.estimation.result.estimate import SignalFit
+from drivetwin.estimation.result.validation import SignalTrace, Validation, compute_fit
 from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
-from drivetwin.shifts.pressures import get_shift_pressures
-from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.split_gears import compute_exclusive_masks
+from drivetwin.shifts.shift import Shift, compute_exclusive_masks
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin

@@ -11,15 +11,15 @@ import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.estimation.data import prepare as preparation
+from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.prepare import (
     collect_tolerances,
     prepare,
     prepare_shift,
 )
-from drivetwin.estimation.data.prepare_signal import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog, ShiftSignals
-from drivetwin.estimation.linear.multi_shift import apply_sensor_error
+from drivetwin.estimation.linear.estimates import apply_sensor_error
 from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import RejectedShift, Shift

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
-from drivetwin.estimation.data.load_stationarity import fit_constant_load
-from drivetwin.estimation.data.prepare_signal import prepare_signal
-from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
+from drivetwin.estimation.data.noise import prepare_signal
+from drivetwin.estimation.data.select_shifts import (
+    SHIFT_SELECTION,
+    fit_constant_load,
+    select_shifts,
+)
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind

@@ -12,7 +12,7 @@ from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
-from drivetwin.estimation.linear.multi_shift import apply_sensor_error
+from drivetwin.estimation.linear.estimates import apply_sensor_error
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.findings import Code
 from drivetwin.vehicle.effects import EffectId, EffectPrior

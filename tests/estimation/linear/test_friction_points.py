@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.estimation.paper.friction import fit_stribeck_law
+from drivetwin.estimation.paper.pipeline import fit_stribeck_law
 from drivetwin.simulation.dual_clutch import Stribeck
 
 SLIP = np.array([16.1, 22.5, 31.9, 41.2, 47.1, 56.1, 64.9, 70.1, 77.2, 79.0])

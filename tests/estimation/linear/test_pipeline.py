@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import estimate_white_noise
-from drivetwin.estimation.data.quantization_error import estimate_quantization_error
+from drivetwin.estimation.data.noise import estimate_quantization_error, estimate_white_noise
 from drivetwin.estimation.data.segments import MOMENTUM, find_off_going_release
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
 from drivetwin.estimation.linear.friction_points import evaluate_fitted_stribeck

@@ -16,7 +16,7 @@ from drivetwin.estimation.linear.ringdown import (
     fit_ringdown,
     remove_jitter,
 )
-from drivetwin.estimation.paper.ringdown import estimate_paper_ringdown
+from drivetwin.estimation.paper.pipeline import estimate_paper_ringdown
 from tests.support.coverage import FULL, assert_covers, vary_draws
 
 TIME = np.arange(0.0, 2.0, 1e-3)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.paper.inertia import ETA_GRID
-from drivetwin.estimation.paper.pipeline import identify_paper_shift
+from drivetwin.estimation.paper.pipeline import ETA_GRID, identify_paper_shift
 from drivetwin.estimation.paper.wlse import Weighting, compute_window_edges, fit_weighted_inertia
 from drivetwin.findings import Code
 from tests.estimation.synthetic import Run, Truth

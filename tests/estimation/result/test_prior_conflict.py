@@ -13,13 +13,14 @@ from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.prior_conflict import (
+    PRIOR,
     Contradiction,
     apply_contradictions,
     check_design_ranges,
     check_efficiency_limit,
     find_contradictions,
+    remove_prior,
 )
-from drivetwin.estimation.result.prior_update import PRIOR, remove_prior
 from drivetwin.estimation.result.verdict import assess, from_prior
 from drivetwin.findings import Code, render
 from drivetwin.vehicle.spec import PriorValue

@@ -8,7 +8,7 @@ import pytest
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.linear.multi_shift import estimate_systematic_std
+from drivetwin.estimation.linear.estimates import estimate_systematic_std
 from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.verdict import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.artifacts import StageResults
+from drivetwin.estimation.identification import StageResults
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.suggestion import (
     CardNumber,

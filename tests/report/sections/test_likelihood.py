@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.artifacts import StageResults
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.estimation.likelihood.effects.correction import keep_fit
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
 from drivetwin.report.blocks import FigureBlock, TableBlock, Tone

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import SignalFit, Verdict
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code, report
 from drivetwin.report.blocks import Cell, FigureBlock, NotesBlock, Tone, VerdictBlock
 from drivetwin.report.figures.parameters import plot_intervals

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.artifacts import StageResults
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify

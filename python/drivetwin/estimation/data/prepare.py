@@ -16,7 +16,7 @@ from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError
 from drivetwin.estimation.data.measured_ratios import refine_ratios
-from drivetwin.estimation.data.prepare_signal import prepare_signal
+from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import (
     DesignData,
@@ -30,12 +30,12 @@ from drivetwin.estimation.data.shift_data import (
 )
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.detect import FoundShifts, refuse_without_shifts
+from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.lockup_clutch import (
     check_lockup_observed,
     refer_to_turbine,
     require_locked_converter,
 )
-from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.distribution import multiply
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from drivetwin._util.arrays import Span
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.data.prepare_signal import prepare_signal
+from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.shift_data import GearData, MeasuredSignal
 from drivetwin.shifts.detect import find_gear_spans
 from drivetwin.shifts.lockup_clutch import CLOSED, LockUp, compute_mean_slip, detect_lock_ups

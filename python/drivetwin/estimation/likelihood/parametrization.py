@@ -24,7 +24,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
-from drivetwin.estimation.likelihood.plant_effect import PlantEffect
+from drivetwin.estimation.likelihood.parametrization import PlantEffect
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector

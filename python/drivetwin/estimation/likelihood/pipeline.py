@@ -12,11 +12,11 @@ from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.excluded import admit_excluded
+from drivetwin.estimation.likelihood.effects.expansion import admit_excluded
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
-from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque import (
+from drivetwin.estimation.likelihood.optimize.initial_guess import (
+    estimate_initial_values,
     estimate_without_torque,
 )
 from drivetwin.estimation.likelihood.parametrization import LOAD_DEVIATION, build_load_deviations

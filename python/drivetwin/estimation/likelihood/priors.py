@@ -4,6 +4,11 @@
 A design value with a standard deviation is a prior, one without is fixed. The laws' priors are
 those of the linear friction fit. Most parameters are unknowns themselves. J′_g = Je + Jo′/i_g² is
 not: a known J′ with a standard deviation is a prior on that sum, one without ties Je to Jo′.
+
+Elements of a shift whose friction law is identifiable, because they slip under load long enough.
+
+The on-coming element always does. An off-going element does if it holds the engine back while the
+speed passes to the other gear: in a power-on downshift and a power-off upshift.
 """
 
 from __future__ import annotations
@@ -16,7 +21,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import InputError
-from drivetwin.estimation.data.quantization_error import estimate_quantization_error
+from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
@@ -26,7 +31,6 @@ from drivetwin.estimation.data.shift_data import (
 )
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.shift_record import RECORD, build_record
-from drivetwin.estimation.likelihood.data.slipping_elements import find_all_slipping_elements
 from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,
@@ -44,10 +48,46 @@ from drivetwin.estimation.linear.momentum_balance import DELAY
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
-from drivetwin.shifts.split_gears import compute_exclusive_spans
+from drivetwin.shifts.shift import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD, PARTNER_REST_STD
 from drivetwin.vehicle.spec import PriorValue
+
+
+@dataclass(frozen=True)
+class SlippingElementSettings:
+    """Settings of the search for elements with an identifiable friction law."""
+
+    min_filled: float = 0.15
+    """Time for which an off-going element must be filled in the inertia phase [s]."""
+    filled_sigma: float = 3.0
+    """Pressure above P0 from which an element is filled, in its noise: closer to P0, noise feigns
+    information on μ [-]."""
+
+
+SLIPPING = SlippingElementSettings()
+
+
+def find_slipping_elements(signals: ShiftSignals, driveline: KnownDriveline) -> tuple[str, ...]:
+    """Find the elements of one shift whose law is free, the on-coming one first."""
+    coming, leaving = driveline.oncoming, driveline.offgoing
+    pressure = signals.pressures[leaving.name]
+    start, end = signals.shift.inertia_phase
+    steady = smooth_adaptive(pressure)  # noise lifts single samples above P0
+    inside = (pressure.time > start) & (pressure.time < end)
+    limit = leaving.P0.value + 2.0 * leaving.P0.std + SLIPPING.filled_sigma * pressure.sigma
+    filled = np.count_nonzero(inside & (steady > limit))
+    slides = filled * float(np.median(np.diff(pressure.time))) > SLIPPING.min_filled
+    return (coming.name, leaving.name) if slides else (coming.name,)
+
+
+def find_all_slipping_elements(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline]
+) -> tuple[str, ...]:
+    """Find the elements whose law is free over all shifts, without repetition."""
+    pairs = zip(signals, drivelines, strict=True)
+    return tuple(dict.fromkeys(name for s, d in pairs for name in find_slipping_elements(s, d)))
+
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
     "te_delay": (-0.5 * RECORD.max_delay, RECORD.max_delay),

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Shifts in the likelihood: residuals of each, and the parts that their plants may have."""
+"""Shifts in the likelihood: residuals of each, and the parts that their plants may have.
+
+Noise of the inputs of a shift: engine torque and pressures.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +15,74 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.noise.residual_covariance import (
+    InputNoise,
+    SeenOutput,
+    SharedNoise,
     Whitener,
+    add_input_noise,
     build_sensor_whitener,
 )
-from drivetwin.estimation.likelihood.noise.shift_noise import weight_by_inputs
 from drivetwin.estimation.likelihood.noise.shift_response import (
     ShiftResponse,
     build_output_row,
     linearise_run,
 )
 from drivetwin.estimation.likelihood.objective import OBJECTIVE, LikelihoodObjective
-from drivetwin.estimation.likelihood.parametrization import TE_OFFSET, ShiftModel, retract
-from drivetwin.estimation.likelihood.plant_effect import PlantEffect
+from drivetwin.estimation.likelihood.parametrization import (
+    TE_OFFSET,
+    PlantEffect,
+    ShiftModel,
+    retract,
+)
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.driveline_run import DrivelineTask
-from drivetwin.simulation.dual_clutch import Signal, Trajectory
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 from drivetwin.vehicle.spec import PriorValue
+
+
+def weight_by_inputs(model: DualClutch, record: ShiftRecord, response: ShiftResponse) -> Whitener:
+    """Build the weighting of a shift that includes the noise of engine torque and pressures.
+
+    Raises LinAlgError where the response has lost its digits.
+    """
+    share, shared = record.compute_torque_share(), None
+    if share is not None:
+        response = response.apply_torque_feedback(np.asarray(share.sum(axis=1)))
+        shared = SharedNoise(TORQUE, share)
+    outputs = [
+        SeenOutput(build_output_row(model, out.name), out.centre, out.sigma)
+        for out in record.outputs
+    ]
+    power = _compute_power(record, response)
+    noise = InputNoise(outputs, power, _compute_sensor_noise(model, record), shared)
+    return add_input_noise(record.sigma, response, noise)
+
+
+def _compute_power(record: ShiftRecord, response: ShiftResponse) -> dict[str, FloatArray]:
+    """Compute the variance (N-1,) of an input's noise, constant over each step, by name."""
+    found = {}
+    middle = 0.5 * (record.time[1:] + record.time[:-1])
+    for name in response.drive:
+        signal = record.engine_torque if name == TORQUE else record.pressures[name]
+        between = float(np.median(np.diff(signal.time)))
+        variance = np.interp(middle, signal.time, record.compute_variance(name))
+        found[name] = variance * between / response.step
+    return found
+
+
+def _compute_sensor_noise(model: DualClutch, record: ShiftRecord) -> FloatArray:
+    """Compute the noise (4,) of a sensor of each state.
+
+    Where the log has no output torque, its noise counts as that which the shaft turns the noise of
+    the output speed into.
+    """
+    sigma = {out.name: out.sigma for out in record.outputs}
+    wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
+    impedance = float(np.sqrt(model.k_o * model.J_out))
+    torque = sigma.get("output_torque", impedance * sigma["output_speed"])
+    return np.array([sigma["engine_speed"], sigma["output_speed"], wheel, torque / model.k_o])
+
 
 OWN_REACH = 3.0
 """Distance from their prior within which unknowns of a part are sought, in its standard deviations:

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.quantization_error import estimate_quantization_error
+from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.segments import MomentumSettings, Segment, find_segments
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.regression.errors_in_variables import (

@@ -23,13 +23,12 @@ from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
-from drivetwin.estimation.artifacts import StageResults
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.excluded import admit_excluded
+from drivetwin.estimation.likelihood.effects.expansion import admit_excluded
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START
@@ -40,8 +39,11 @@ from drivetwin.estimation.likelihood.parametrization import (
 )
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
-from drivetwin.estimation.multi_log.consistency import check_consistency
-from drivetwin.estimation.multi_log.verdicts import apply_consistency, pool_curves
+from drivetwin.estimation.multi_log.consistency import (
+    apply_consistency,
+    check_consistency,
+    pool_curves,
+)
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.multi_log import CONSISTENCY, LogShare, Several

@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""The paper's procedure on one shift, stage by stage as published."""
+"""The paper's procedure on one shift, stage by stage as published.
+
+Gear efficiency η and lumped inertia J′ (eq. 10), the paper's way and in momentum form.
+
+η·T_e - T_o/i_g = J′·ω_e'        J′ = Je + Jo′/i_g²,  Je = J1·η + J2e
+
+Load by the paper's method.
+
+Lock-up oscillation by the paper's method.
+
+Friction curve by the paper's method.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +18,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
+from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
-from drivetwin.estimation.linear.ringdown import RingDown, compute_shaft_parameters
-from drivetwin.estimation.paper.friction import PaperFriction, estimate_paper_friction
-from drivetwin.estimation.paper.inertia import PaperInertiaSettings, estimate_paper_inertia
-from drivetwin.estimation.paper.load import PaperLoadSettings, estimate_paper_load
-from drivetwin.estimation.paper.ringdown import estimate_paper_ringdown
-from drivetwin.estimation.paper.wlse import GridFit, Weighting
+from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.linear.friction_points import compute_mean_slip
+from drivetwin.estimation.linear.ringdown import (
+    RingDown,
+    _refuse,
+    _select_ring_samples,
+    compute_shaft_parameters,
+)
+from drivetwin.estimation.linear.ringdown_settings import RING_DOWN
+from drivetwin.estimation.paper.wlse import (
+    GridFit,
+    GridRow,
+    Weighting,
+    compute_central_difference,
+    compute_window_edges,
+    compute_window_means,
+    drop_nan_rows,
+    fit_weighted_inertia,
+)
 from drivetwin.estimation.result.assessment import collect_fill_pressures
-from drivetwin.estimation.result.estimate import Estimate, Verdict
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.estimation.result.prior_conflict import check_range
 from drivetwin.estimation.result.verdict import (
@@ -28,6 +53,196 @@ from drivetwin.estimation.result.verdict import (
 )
 from drivetwin.findings import Code, Finding, explain, report
 from drivetwin.parameters import get_parameter_spec
+from drivetwin.simulation.dual_clutch import Stribeck
+
+
+@dataclass(frozen=True, eq=False)
+class PaperFriction:
+    """The paper's μ-slip points, from extremes of T_o in the inertia phase, and their curve."""
+
+    element: str
+    curve: FrictionCurve
+    extremes_time: FloatArray
+
+
+def estimate_paper_friction(
+    signals: ShiftSignals, driveline: KnownDriveline, points: int = 40
+) -> PaperFriction:
+    """T_c ≈ T_o/i_out (eq. 16) at the extremes of T_o over the inertia phase, slip by eq. 15.
+
+    T_o is averaged over 10 ms windows before its extremes are taken; where it does not oscillate
+    (fewer than eight extremes) every window counts. The curve is the points' running mean by slip;
+    the Stribeck law is fitted to the points. Raises IdentificationError for a short inertia phase.
+    """
+    element, span = driveline.oncoming, signals.shift.inertia_phase
+    edges = compute_window_edges((span[0] + 0.01, span[1] - 0.005))
+    torque = compute_window_means(signals.output_torque, edges)
+    pressure = compute_window_means(signals.pressures[element.name], edges)
+    time, torque, pressure = drop_nan_rows(0.5 * (edges[1:] + edges[:-1]), torque, pressure)
+    slip = np.abs(compute_mean_slip(signals, driveline, time))
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(torque))) != 0) + 1
+    picked = turns if turns.size >= 8 else np.arange(time.size)
+    capacity = element.gain * (pressure[picked] - element.P0.value)
+    usable = capacity > 0.0
+    picked = picked[usable]
+    if picked.size < 5:
+        raise IdentificationError(
+            f"only {picked.size} points of the inertia phase have pressure above P0",
+            "check P0 on the card and the pressure channel of the on-coming element",
+        )
+    mu = np.abs(torque[picked] / element.b) / capacity[usable]
+    order = np.argsort(slip[picked])
+    s, m = slip[picked][order], mu[order]
+    grid = np.linspace(float(s[0]), float(s[-1]), points)
+    bandwidth = float(np.ptp(s)) / np.sqrt(s.size)
+    kernel = np.exp(-0.5 * ((grid[:, None] - s) / bandwidth) ** 2)
+    smooth = (kernel @ m) / kernel.sum(axis=1)
+    nothing = np.full(points, np.nan)
+    curve = FrictionCurve(grid, smooth, nothing, nothing, s, m, fit_stribeck_law(s, m), "paper")
+    return PaperFriction(element.name, curve, time[picked])
+
+
+def fit_stribeck_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
+    """Stribeck law by least squares on μ-slip points (n,): linear in three, v_s on a grid.
+
+    v_s is at least the smallest slip measured, because the data contain no rise of the law below
+    it. mu_c and mu_s are constrained to be nonnegative: with few points the terms are strongly
+    correlated, and an unconstrained fit may be unphysical.
+    """
+    best: tuple[float, FloatArray, float] | None = None
+    for v_s in np.geomspace(max(2.0, float(slip.min())), 100.0, 40):
+        fall = np.exp(-slip / v_s)
+        basis = np.column_stack([1.0 - fall, fall, slip])
+        found = lsq_linear(basis, mu, ([0.0, 0.0, -np.inf], np.inf), method="bvls")
+        if best is None or found.cost < best[0]:
+            best = (float(found.cost), found.x, float(v_s))
+    assert best is not None
+    mu_c, mu_s, mu_v = (float(v) for v in best[1])
+    return Stribeck(mu_c, mu_s, best[2], mu_v)
+
+
+def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -> RingDown:
+    """Frequency from the spacing of the extremes of T_o, damping from their logarithmic decrement.
+
+    T_o is averaged over 10 ms windows; half the difference of neighbouring extremes falls by
+    exp(-σ·T/2). Extremes count while they exceed four times the noise of an average.
+    """
+    part = _select_ring_samples(torque, lockup, end, RING_DOWN.latest_start)
+    edges = compute_window_edges((part.time[0], part.time[-1]))
+    mean, centre = compute_window_means(part, edges), 0.5 * (edges[1:] + edges[:-1])
+    count = max(part.time.size / mean.size, 1.0)
+    floor = 4.0 * torque.sigma / np.sqrt(count) + 1e-3 * float(np.ptp(mean))
+    turn = np.flatnonzero(np.diff(np.sign(np.diff(mean))) != 0) + 1
+    picked: list[int] = []
+    for k in turn:
+        if picked and abs(mean[k] - mean[picked[-1]]) < 2.0 * floor:
+            break
+        picked.append(int(k))
+    if len(picked) < 4:
+        raise _refuse(f"only {len(picked)} extremes stand out of the noise")
+    at = np.asarray(picked)
+    bend = mean[at - 1] - 2.0 * mean[at] + mean[at + 1]
+    shift = 0.5 * (mean[at - 1] - mean[at + 1]) / bend
+    instants = centre[at] + shift * (centre[1] - centre[0])
+    order = np.arange(at.size)
+    half_period = float(np.polyfit(order, instants, 1)[0])
+    swing = np.log(0.5 * np.abs(np.diff(mean[at])))
+    decrement = -float(np.polyfit(order[:-1], swing, 1)[0])
+    rate, omega = decrement / half_period, np.pi / half_period
+    if not (rate > 0.0 and RING_DOWN.band[0] < omega / (2 * np.pi) < RING_DOWN.band[1]):
+        raise _refuse(f"decay rate {rate:.3g} 1/s at {omega / (2 * np.pi):.3g} Hz")
+    return RingDown(
+        rate, omega, np.zeros((2, 2)), part.time, part.values, part.values, instants, mean[at]
+    )
+
+
+@dataclass(frozen=True)
+class PaperLoadSettings:
+    """Two-stage grid of T_v/i_f [N m] and weighting of the paper; J3 range in kg·m²."""
+
+    weighting: Weighting
+    stop: float = 4000.0
+    coarse: float = 500.0
+    fine: float = 100.0
+
+
+def estimate_paper_load(
+    signals: ShiftSignals, i_f: float, span: Span, settings: PaperLoadSettings
+) -> GridFit:
+    """Search T_v/i_f from 0 to `stop` in coarse steps, then in fine ones around the best.
+
+    The RMS error is that of eq. 11 divided by i_f: a torque at the output shaft [N m]. Without a
+    wheel-speed channel the output speed divided by i_f stands in for it.
+    """
+    edges = compute_window_edges(span)
+    if signals.wheel_speed is not None:
+        speed = compute_window_means(signals.wheel_speed, edges)
+    else:
+        speed = compute_window_means(signals.output_speed, edges) / i_f
+    acceleration = compute_central_difference(speed)
+    output_torque = compute_window_means(signals.output_torque, edges)[1:-1]
+    acceleration, output_torque = drop_nan_rows(acceleration, output_torque)
+
+    def row(load: float) -> GridRow:
+        torque = output_torque - load
+        slope, _ = fit_weighted_inertia(torque, acceleration, settings.weighting, scale=i_f)
+        residual = torque - slope * acceleration
+        return GridRow(float(load), i_f * slope, float(np.sqrt(np.mean(residual**2))))
+
+    coarse = [row(v) for v in np.arange(0.0, settings.stop + 1e-9, settings.coarse)]
+    centre = min(coarse, key=lambda r: r.rmse).value
+    near = np.arange(centre - settings.coarse, centre + settings.coarse + 1e-9, settings.fine)
+    tabulated = {r.value for r in coarse}
+    fine = [row(v) for v in near if v >= 0.0 and float(v) not in tabulated]
+    rows = tuple(sorted([*coarse, *fine], key=lambda r: r.value))
+    best = min(rows, key=lambda r: r.rmse)
+    torque = output_torque - best.value
+    _, weights = fit_weighted_inertia(torque, acceleration, settings.weighting, scale=i_f)
+    return GridFit(rows, best, acceleration, torque, output_torque - rows[0].value, weights)
+
+
+ETA_GRID = tuple(round(1.0 - 0.05 * k, 2) for k in range(7))
+"""Grid of the paper: 1.00 down to 0.70 in steps of 0.05."""
+
+
+@dataclass(frozen=True)
+class PaperInertiaSettings:
+    """Grid of η and weighting of the paper's search; J′ range in kg·m² at the engine."""
+
+    weighting: Weighting
+    eta_grid: tuple[float, ...] = ETA_GRID
+
+
+def estimate_paper_inertia(
+    signals: ShiftSignals, ratio: float, span: Span, settings: PaperInertiaSettings
+) -> GridFit:
+    """Search η on the grid; J′ by weighted least squares for each (THEORY section 4).
+
+    `ratio` is the overall ratio i_g of the gear held during `span` [s]. The RMS error is that of
+    eq. 10, unweighted, times i_g: a torque at the output shaft [N m].
+    """
+    edges = compute_window_edges(span)
+    acceleration = compute_central_difference(compute_window_means(signals.engine_speed, edges))
+    engine_torque = compute_window_means(signals.engine_torque, edges)[1:-1]
+    output_torque = compute_window_means(signals.output_torque, edges)[1:-1]
+    acceleration, engine_torque, output_torque = drop_nan_rows(
+        acceleration, engine_torque, output_torque
+    )
+
+    def excess(eta: float) -> FloatArray:
+        return eta * engine_torque - output_torque / ratio
+
+    def row(eta: float) -> GridRow:
+        inertia, _ = fit_weighted_inertia(excess(eta), acceleration, settings.weighting)
+        residual = excess(eta) - inertia * acceleration
+        return GridRow(eta, inertia, float(ratio * np.sqrt(np.mean(residual**2))))
+
+    rows = tuple(row(eta) for eta in settings.eta_grid)
+    best = min(rows, key=lambda r: r.rmse)
+    torque = excess(best.value)
+    _, weights = fit_weighted_inertia(torque, acceleration, settings.weighting)
+    return GridFit(rows, best, acceleration, torque, excess(rows[0].value), weights)
+
 
 EXCITATION = 0.03
 """Least relative variation of the engine torque in gear for which eq. 10 separates η and J′."""

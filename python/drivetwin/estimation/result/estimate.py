@@ -7,15 +7,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.parameters import ParameterSpec, get_parameter_spec
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
 from drivetwin.vehicle.spec import Z95 as Z95  # the place where results look it up
 from drivetwin.vehicle.spec import PriorValue
-
-FloatArray = NDArray[np.float64]
-
 
 OF_RATIO = ", μ over η"
 """Suffix of the method name for a friction curve that is μ/η."""

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Estimates of one identification, shared by all methods."""
+"""Estimates of one identification, shared by all methods.
+
+Joint distribution of estimates and friction laws, from which models are drawn.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,20 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.result.cause import Cause
+from drivetwin.estimation.result.cause import Cause, PredictedSpread
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
-from drivetwin.estimation.result.joint import JointCovariance
-from drivetwin.estimation.result.spread import PredictedSpread
 from drivetwin.estimation.result.suggestion import CardNumber
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import make_shift_labels
+
+
+@dataclass(frozen=True, eq=False)
+class JointCovariance:
+    """Total `covariance` (n, n) over `ids`: parameters, and coefficients of friction laws by
+    `make_law_id`."""
+
+    ids: tuple[str, ...]
+    covariance: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""The estimator families, by the names used on the command line and in results."""
+"""The estimator families, by the names used on the command line and in results.
+
+Status of an identified model.
+"""
 
 from __future__ import annotations
 
 from enum import StrEnum
+
+
+class ModelStatus(StrEnum):
+    """Status of an identified model by its free-running simulation."""
+
+    VALID = "valid"
+    LIMITED = "valid with limits"
+    NOT_VALID = "not valid"
+    NOT_VALIDATED = "not validated"
+
+    @property
+    def is_confirmed(self) -> bool:
+        """True if the simulation of the model follows the log."""
+        return self in (ModelStatus.VALID, ModelStatus.LIMITED)
 
 
 class Method(StrEnum):

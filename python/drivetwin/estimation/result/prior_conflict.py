@@ -4,6 +4,11 @@
 A design value is one additional measurement. If the log contradicts it, the estimate lies between
 the two and may match neither: a warning is issued, and the parameters that depend on it do not
 count as identified. A design range does not bound the estimate; a value outside gives a warning.
+
+Update of a linear estimate with prior knowledge, and its inverse (prior removal).
+
+The estimates and their covariance are a normal distribution. A prior value ± σ is one more
+measurement of one parameter; σ = 0 fixes it. The other parameters follow by their correlation.
 """
 
 from __future__ import annotations
@@ -16,7 +21,6 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
-from drivetwin.estimation.result.prior_update import PRIOR, remove_prior
 from drivetwin.estimation.result.verdict import reject_identified
 from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.parameters import (
@@ -27,6 +31,68 @@ from drivetwin.parameters import (
 )
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
+
+
+@dataclass(frozen=True)
+class PriorSettings:
+    """Limits of the comparison of log and design values."""
+
+    contradiction: float = 3.0
+    """Difference of log and design value from which a finding is due [standard deviations]."""
+    min_information: float = 0.02
+    """Share of the information on a parameter below which none is from the log [ratio]."""
+
+
+PRIOR = PriorSettings()
+
+
+def add_priors(
+    ids: Sequence[str],
+    values: FloatArray,
+    covariance: FloatArray,
+    known: Mapping[str, PriorValue],
+) -> tuple[FloatArray, FloatArray, tuple[Finding, ...]]:
+    """Update values (q,) and covariance (q, q) with the known values; return findings too.
+
+    A finding is returned for each exactly known value that the log contradicts; prior_conflict.py
+    checks the others.
+    Known values of parameters that are not among `ids` change nothing.
+    """
+    values, covariance = values.copy(), covariance.copy()
+    found: list[Finding] = []
+    for name, prior in known.items():
+        if name not in ids:
+            continue
+        k = ids.index(name)
+        column, spread = covariance[:, k].copy(), covariance[k, k] + prior.std**2
+        if spread <= 0.0:
+            continue
+        miss = prior.value - values[k]
+        if prior.std == 0.0 and abs(miss) > PRIOR.contradiction * np.sqrt(spread):
+            unit = get_parameter_spec(name).unit
+            card, log = Number(prior.value, unit), Number(float(values[k]), unit)
+            found.append(report(Code.FIXED_VALUE_CONTRADICTED, name, card=card, log=log))
+        values = values + column * (miss / spread)
+        covariance -= np.outer(column, column) / spread
+        covariance[np.diag_indices_from(covariance)] = np.maximum(np.diag(covariance), 0.0)
+    return values, covariance, tuple(found)
+
+
+def remove_prior(
+    values: FloatArray, covariance: FloatArray, k: int, prior: PriorValue
+) -> tuple[FloatArray, FloatArray] | None:
+    """Values (q,) and covariance (q, q) with the normal `prior` of number k taken out.
+
+    None where the prior is exact or what is left would be next to nothing.
+    """
+    column, variance = covariance[:, k], float(covariance[k, k])
+    if prior.std <= 0.0 or not np.isfinite(covariance).all() or variance <= 0.0:
+        return None
+    left = prior.std**2 - variance
+    if left < PRIOR.min_information * prior.std**2:
+        return None
+    freed = covariance + np.outer(column, column) / left
+    return values + column * ((values[k] - prior.value) / left), freed
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from drivetwin.export.input_delays import InputDelays
 from drivetwin.export.subject import Subject, build_note
 from drivetwin.export.targets import DEFAULT_STEP
 from drivetwin.shifts.detect import require_shifts
+from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
-from drivetwin.shifts.pressures import get_shift_pressures
 from drivetwin.simulation.dual_clutch import FloatArray
 from drivetwin.simulation.part_parameters import describe_parts
 from drivetwin.twin.twin import Twin

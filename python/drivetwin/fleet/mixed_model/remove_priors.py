@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.linear.friction_points import P0, evaluate_stribeck
-from drivetwin.estimation.result.estimate import FloatArray
-from drivetwin.estimation.result.prior_update import remove_prior
+from drivetwin.estimation.result.prior_conflict import remove_prior
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _LAW_SIZE = P0

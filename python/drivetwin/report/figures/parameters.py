@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from drivetwin.estimation.result.estimate import Estimate, FloatArray, Verdict
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.report.figure import Figure, make_trace
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.style import DIVERGING, MUTED, VERDICT_COLOURS, make_axis, make_layout

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display
-from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.report.decimate import decimate_around
 from drivetwin.report.figure import Entry, Figure, make_trace
 from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, make_axis, make_layout

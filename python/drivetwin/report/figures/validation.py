@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import BAR, NM, RPM, Display, scale_display
-from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import (

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drivetwin.estimation.likelihood.effects.torques import REFERENCE_TORQUE
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import (
@@ -15,8 +16,7 @@ from drivetwin.estimation.likelihood.effects.columns import (
     build_columns,
     observe,
 )
-from drivetwin.estimation.likelihood.effects.gearbox import REFERENCE_TORQUE
-from drivetwin.estimation.likelihood.effects.operating_point import (
+from drivetwin.estimation.likelihood.effects.effect import (
     OperatingPoint,
     evaluate_operating_point,
 )

@@ -9,13 +9,13 @@ from scipy.signal import lsim
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
+from drivetwin.estimation.likelihood.effects.effect import evaluate_operating_point
 from drivetwin.estimation.likelihood.effects.inputs import (
     apply_pressure_delay,
     apply_torque_lag,
     build_pressure_delay,
     build_torque_lag,
 )
-from drivetwin.estimation.likelihood.effects.operating_point import evaluate_operating_point
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import NominalRun, SyntheticVehicle
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.effects.test_columns import operating_point

@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import observe
-from drivetwin.estimation.likelihood.effects.load import BRAKE_DRAG
-from drivetwin.estimation.likelihood.effects.operating_point import (
+from drivetwin.estimation.likelihood.effects.effect import (
     OperatingPoint,
     evaluate_operating_point,
 )
+from drivetwin.estimation.likelihood.effects.load import BRAKE_DRAG
 from tests.estimation.likelihood.fixtures import bench, problem
 
 STD = 0.01

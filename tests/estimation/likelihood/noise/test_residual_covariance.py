@@ -13,9 +13,8 @@ from drivetwin.estimation.data.shift_data import TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.output import Output
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.noise.residual_covariance import build_sensor_whitener
-from drivetwin.estimation.likelihood.noise.shift_noise import weight_by_inputs
 from drivetwin.estimation.likelihood.noise.shift_response import build_output_row, linearise_run
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm, weight_by_inputs
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.fixtures import bench, fitted, problem

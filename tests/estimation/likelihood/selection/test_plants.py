@@ -15,7 +15,7 @@ from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
-from drivetwin.estimation.likelihood.plant_effect import PLANTS
+from drivetwin.estimation.likelihood.parametrization import PLANTS
 from drivetwin.estimation.likelihood.selection.candidates import try_plants
 from drivetwin.estimation.likelihood.selection.plants import build_plant_priors, extend_problem
 from drivetwin.estimation.result.cause import LEAD, Group

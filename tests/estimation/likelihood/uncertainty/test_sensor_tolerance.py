@@ -17,7 +17,7 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     compute_sensitivity,
     compute_sensor_shifts,
 )
-from drivetwin.estimation.linear.multi_shift import apply_sensor_error
+from drivetwin.estimation.linear.estimates import apply_sensor_error
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 from tests.support.shared_results import shared

@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Data of one shift for the fit: simulation inputs and the compared outputs."""
+"""Data of one shift for the fit: simulation inputs and the compared outputs.
+
+Quantization errors of an input that its own noise does not dither.
+
+While a torque or pressure stays at a level the error stays too: its mean over that time is as far
+off as one sample, and noise of the same size that comes and goes from sample to sample would be far
+less. Each stay has an error of its own, so what it does is that of white noise of the same power
+there.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +15,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals, TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.input_smoothing import (
     compute_bend,
@@ -20,11 +30,42 @@ from drivetwin.estimation.likelihood.data.input_smoothing import (
     smooth_pressure,
 )
 from drivetwin.estimation.likelihood.data.output import ComparedOutputs, Output
-from drivetwin.estimation.likelihood.data.quantization import Quantization, estimate_quantization
 from drivetwin.simulation import network
 from drivetwin.simulation.driveline_run import COMPARED
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal, Trajectory
 from drivetwin.vehicle.spec import PriorValue
+
+
+@dataclass(frozen=True, eq=False)
+class Quantization:
+    """Errors of the samples of a rounded signal that do not average out.
+
+    `error` is the standard deviation of the mean error of one stay at a level, in the signal's
+    unit; `stay` (m,) the number of the stay that each sample belongs to, from 0.
+    """
+
+    error: float
+    stay: NDArray[np.intp]
+
+    @property
+    def sigma(self) -> FloatArray:
+        """White noise (m,) of the samples with the same power: its mean over a stay is `error`."""
+        return np.asarray(self.error * np.sqrt(np.bincount(self.stay)[self.stay]))
+
+    def draw(self, rng: np.random.Generator) -> FloatArray:
+        """Draw random errors (m,)."""
+        return np.asarray(self.error * rng.standard_normal(int(self.stay[-1]) + 1)[self.stay])
+
+
+def estimate_quantization(signal: MeasuredSignal, step: float) -> Quantization | None:
+    """Compute the errors that quantization to `step` leaves, in the signal's unit; None if noise
+    dithers them."""
+    error = estimate_quantization_error(signal, step)
+    if error == 0.0:
+        return None
+    level = np.round(smooth_adaptive(signal) / step)
+    return Quantization(error, np.cumsum(np.diff(level, prepend=level[0]) != 0.0))
+
 
 TORQUE = ENGINE_TORQUE
 """Name of the engine torque among the inputs; the others are pressures by element."""

@@ -1,18 +1,141 @@
 # SPDX-License-Identifier: MIT
-"""Entry of an effect: meaning, prior size, columns of a fit, action in a synthetic log."""
+"""Entry of an effect: meaning, prior size, columns of a fit, action in a synthetic log.
+
+Run and linear response of one shift about which the columns of effects are formed.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.estimation.likelihood.data.output import IndexArray
+from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.estimation.likelihood.noise.shift_response import ShiftResponse, linearise_run
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.simulation.dual_clutch import DualClutch, Trajectory
 from drivetwin.vehicle.effects import EffectId
+
+MIN_SPACING_S = 1e-6
+"""Distance [s] from a grid point within which an event gets no point of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class OperatingPoint:
+    """One shift simulated at a point of the unknowns, on a grid that holds the run's own events.
+
+    A lock between two samples acts in a linear response at the end of its step; with the events
+    on the grid it acts in time. `rows` are the points of the record's grid among those of the run.
+    """
+
+    part: ShiftTerm
+    point: ParameterVector
+    model: DualClutch
+    run: Trajectory
+    response: ShiftResponse
+    rows: IndexArray
+
+    @property
+    def record(self) -> ShiftRecord:
+        """Measured data of the shift."""
+        return self.part.record
+
+    @cached_property
+    def middle(self) -> FloatArray:
+        """Middle (N-1,) of each step [s]."""
+        return compute_middle(self.run.time)
+
+    @cached_property
+    def progress(self) -> FloatArray:
+        """Share (N,) of the span that has passed, 0 to 1."""
+        time = self.run.time
+        return np.asarray((time - time[0]) / self.duration)
+
+    @property
+    def duration(self) -> float:
+        """Length of the span [s]."""
+        return float(self.run.time[-1] - self.run.time[0])
+
+    @cached_property
+    def largest_engine_torque(self) -> float:
+        """Largest magnitude of the engine torque [N m]."""
+        return float(np.max(np.abs(self.record.engine_torque.values)))
+
+    @cached_property
+    def largest_shaft_torque(self) -> float:
+        """Largest magnitude of the simulated shaft torque [N m]."""
+        return float(np.max(np.abs(self.run.shaft_torque)))
+
+    @cached_property
+    def load(self) -> float:
+        """Magnitude of the load at the output shaft [N m]."""
+        return abs(self.part.structure.compute_load(self.point))
+
+    @cached_property
+    def engine_torque(self) -> FloatArray:
+        """Acting engine torque (N-1,) over each step [N m]."""
+        signal = self.part.get_acting_torque(self.point)
+        return np.interp(self.middle, signal.arrival, signal.values)
+
+    @cached_property
+    def oncoming_share(self) -> FloatArray:
+        """Share (N-1,) of the torque that the on-coming element has taken over, from 0 to 1."""
+        offgoing, oncoming = (
+            np.abs(compute_middle(self.run.clutch_torque[one.name])) * one.a
+            for one in self.part.structure.elements
+        )
+        share = oncoming / np.maximum(offgoing + oncoming, 1e-9)
+        return np.asarray(np.maximum.accumulate(np.clip(share, 0.0, 1.0)))
+
+    def describe_shift(self) -> str:
+        """Return the shift in words: its number in the log."""
+        number = int(self.part.structure.label.removeprefix("start")) + 1
+        return f"shift {number}"
+
+    def compute_rate(self, column: FloatArray) -> FloatArray:
+        """Compute the rate of change (N-1,) of a column (N,) over each step."""
+        return np.asarray(np.diff(column) / np.diff(self.run.time))
+
+    def evaluate_contact(self, element: str) -> Contact:
+        """Evaluate slip, pressure and friction of an element over each step."""
+        return evaluate_contact(self.part, self.point, self.run, element)
+
+    def build_force(self, speed: int, torque: FloatArray) -> FloatArray:
+        """Build forces (N-1, 4) of a torque (N-1,) [N m] on one of the speeds: 0 engine, 1
+        output, 2 wheel."""
+        force = np.zeros((self.middle.size, 4))
+        force[:, speed] = torque
+        return force
+
+
+def compute_middle(column: FloatArray) -> FloatArray:
+    """Compute the means (N-1,) of successive samples of a column (N,)."""
+    return np.asarray(0.5 * (column[1:] + column[:-1]))
+
+
+def evaluate_operating_point(part: ShiftTerm, point: ParameterVector) -> OperatingPoint | None:
+    """Simulate a shift at `point` and linearise it; None if it has no complete, finite run."""
+    run = part.simulate(point)
+    if run is None:
+        return None
+    grid, model = part.record.time, part.structure.build_model(point)
+    events = np.array([one.time for one in run.events if grid[0] < one.time < grid[-1]])
+    if events.size:
+        beside = np.min(np.abs(grid[:, None] - events), axis=0) > MIN_SPACING_S
+        time = np.unique(np.concatenate([grid, events[beside]]))
+        run = part.simulate_on(point, time)
+    response = linearise_run(model, run, part.record)
+    if run.status != "completed" or not response.finite:
+        return None
+    return OperatingPoint(part, point, model, run, response, np.searchsorted(run.time, grid))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
-from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect, OperatingPoint
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     SyntheticVehicle,
     compute_friction_work,

@@ -8,8 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
-from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
-from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint, compute_middle
+from drivetwin.estimation.likelihood.effects.effect import (
+    Disturbance,
+    Effect,
+    OperatingPoint,
+    compute_middle,
+)
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
 from drivetwin.estimation.likelihood.noise.shift_response import build_slip_row
 from drivetwin.vehicle.effects import EffectId

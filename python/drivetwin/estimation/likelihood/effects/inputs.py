@@ -12,8 +12,7 @@ from drivetwin._util.signal_processing import apply_lag
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
-from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
-from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
+from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect, OperatingPoint
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId

@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
-from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint, compute_middle
-from drivetwin.estimation.likelihood.effects.random_walk import (
+from drivetwin.estimation.likelihood.effects.effect import (
+    Disturbance,
+    Effect,
+    OperatingPoint,
     WalkStream,
     build_random_walk,
+    compute_middle,
     draw_walk,
 )
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle

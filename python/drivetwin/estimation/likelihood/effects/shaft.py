@@ -9,8 +9,12 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
-from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
-from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint, compute_middle
+from drivetwin.estimation.likelihood.effects.effect import (
+    Disturbance,
+    Effect,
+    OperatingPoint,
+    compute_middle,
+)
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
 from drivetwin.simulation.vehicle_parts import InputShaft, ShaftTable, compute_gap
 from drivetwin.vehicle.effects import EffectId

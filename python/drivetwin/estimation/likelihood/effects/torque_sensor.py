@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
-from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect
-from drivetwin.estimation.likelihood.effects.operating_point import OperatingPoint
-from drivetwin.estimation.likelihood.effects.random_walk import (
+from drivetwin.estimation.likelihood.effects.effect import (
+    Disturbance,
+    Effect,
+    OperatingPoint,
     WalkStream,
     build_random_walk,
     draw_walk,

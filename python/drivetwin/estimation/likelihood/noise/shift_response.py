@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
-from drivetwin.estimation.likelihood.noise.linear_response import LinearResponse
+from drivetwin.estimation.likelihood.noise.residual_covariance import LinearResponse
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Trajectory
 
 BoolArray = NDArray[np.bool_]

@@ -4,28 +4,76 @@
 Where an effect changes the motion much, no column at the minimum of the dual clutch describes it:
 a mode of the input side is absorbed by k_o before it shows. Such an effect is put into the plant
 (`PLANTS`) and the fit repeated.
+
+Log evidence of one model against another, and the average over models.
+
+With Q and the information F at the minima of both, and s the prior standard deviations of the
+unknowns that the wider one adds, Laplace's log evidence for it is
+
+    ln B = ½·(Q - Q′)/max(χ², 1) + ½·(log|F| - log|F′|) - Σ log s
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from math import log
+from typing import Protocol
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.joint_step import SIZES
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence, compute_covariance
-from drivetwin.estimation.likelihood.plant_effect import PLANTS, PlantEffect
-from drivetwin.estimation.likelihood.selection.model_comparison import Minimum, compute_evidence
+from drivetwin.estimation.likelihood.parametrization import PLANTS, PlantEffect
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
+
+
+class Minimum(Protocol):
+    """Minimum of Q: a fit, or the result of a search."""
+
+    @property
+    def point(self) -> ParameterVector:
+        """Unknowns at the minimum."""
+
+    @property
+    def normal(self) -> NormalEquations:
+        """Expansion of Q there."""
+
+
+def compute_evidence(
+    plain: Minimum, extended: Minimum, chi2: float, priors: Sequence[PriorValue]
+) -> float:
+    """Compute the log evidence of an extended model against a plain one.
+
+    Q alone counts: both have the same weighting, or nearly. `chi2` is the residual power per
+    sample, `priors` are those of the unknowns that the extended model adds.
+    """
+    fall = plain.normal.cost - extended.normal.cost
+    before, after = (np.linalg.slogdet(one.normal.information)[1] for one in (plain, extended))
+    spread = np.sum(np.log([one.std for one in priors]))
+    return float(0.5 * fall / max(chi2, 1.0) + 0.5 * (before - after) - spread)
+
+
+def average_over(fit: LikelihoodFit, others: Iterable[tuple[FloatArray, float]]) -> LikelihoodFit:
+    """Widen the covariance of a fit by other models: `moves` (p,) of the unknowns to each, and its
+    log odds.
+
+    It grows by the outer products of the moves, times the probabilities of the models.
+    """
+    covariance = fit.covariance
+    for moves, odds in others:
+        covariance = covariance + np.exp(-np.logaddexp(0.0, -odds)) * np.outer(moves, moves)
+    return replace(fit, covariance=covariance)
+
 
 _LEAST_SPREAD = 1e-3
 """Least prior standard deviation of a size that is stated exactly, over the size [-]."""

@@ -15,9 +15,8 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.pressure_roles import make_pressure_role
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.likelihood.effects.columns import observe
-from drivetwin.estimation.likelihood.effects.operating_point import evaluate_operating_point
-from drivetwin.estimation.likelihood.effects.sensor_tolerance import build_sensor_columns
+from drivetwin.estimation.likelihood.effects.columns import build_sensor_columns, observe
+from drivetwin.estimation.likelihood.effects.effect import evaluate_operating_point
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
 from drivetwin.estimation.optimize.objective import ParameterVector

@@ -12,7 +12,7 @@ import pytest
 from drivetwin.dyno.files import format_card
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA, DesignData, MeasuredSignal
-from drivetwin.estimation.likelihood.optimize.initial_guess_without_torque import (
+from drivetwin.estimation.likelihood.optimize.initial_guess import (
     estimate_without_torque,
 )
 from drivetwin.vehicle.card import load_card

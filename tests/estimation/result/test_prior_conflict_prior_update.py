@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.estimation.result.prior_update import add_priors, remove_prior
+from drivetwin.estimation.result.prior_conflict import add_priors, remove_prior
 from drivetwin.vehicle.spec import PriorValue
 
 IDS = ("eta", "k_o", "c_o")

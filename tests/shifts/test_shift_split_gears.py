@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.split_gears import (
+from drivetwin.shifts.shift import (
+    Shift,
     compute_exclusive_masks,
     compute_exclusive_spans,
     split_shared_gears,

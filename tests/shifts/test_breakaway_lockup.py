@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from drivetwin.shifts.slow_sampling import locate_slip_end, locate_slip_start
+from drivetwin.shifts.breakaway_lockup import locate_slip_end, locate_slip_start
 
 STEP = 0.02
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.likelihood.effects.correction import keep_fit
-from drivetwin.estimation.likelihood.uncertainty.predicted_spread import predict_spread
+from drivetwin.estimation.likelihood.estimates import predict_spread
 from tests.estimation.likelihood.fixtures import fitted
 
 

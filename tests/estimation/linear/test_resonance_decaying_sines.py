@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.linear.decaying_sines import Windows, compute_misfits, fit_decaying_sines
+from drivetwin.estimation.linear.resonance import Windows, compute_misfits, fit_decaying_sines
 
 
 def _make(

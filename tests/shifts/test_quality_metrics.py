@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.channels.shiftlog import Channel, Quantity
-from drivetwin.shifts.metrics import (
+from drivetwin.shifts.quality import (
     compute_command_response_time,
     compute_duration,
     compute_largest_rate,

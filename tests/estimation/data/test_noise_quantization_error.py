@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import norm
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.quantization_error import estimate_quantization_error
+from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 
 STEP = 12.5

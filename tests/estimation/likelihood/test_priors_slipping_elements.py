@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
-from drivetwin.estimation.likelihood.data.slipping_elements import (
+from drivetwin.estimation.likelihood.priors import (
     SLIPPING,
     find_all_slipping_elements,
     find_slipping_elements,

@@ -8,7 +8,7 @@ import pytest
 
 from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
 from drivetwin.errors import MissingChannelError
-from drivetwin.shifts.pressures import get_shift_pressures, is_shared_pressure
+from drivetwin.shifts.kinematics import get_shift_pressures, is_shared_pressure
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 

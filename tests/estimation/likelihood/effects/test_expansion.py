@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks.estimation.mismatch_log import Rates, make_mismatch_log
-from drivetwin.estimation.likelihood.effects import excluded
+from drivetwin.estimation.likelihood.effects import expansion
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.excluded import admit_excluded
-from drivetwin.estimation.likelihood.effects.expansion import EffectExpansion, expand_effects
+from drivetwin.estimation.likelihood.effects.expansion import (
+    EffectExpansion,
+    admit_excluded,
+    expand_effects,
+)
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.result.cause import Group
@@ -46,7 +49,7 @@ def test_an_exclusion_falls_by_the_lead_of_its_evidence(
         }
         return replace(found, evidence=evidence)
 
-    monkeypatch.setattr(excluded, "expand_effects", expand)
+    monkeypatch.setattr(expansion, "expand_effects", expand)
     priors, findings = admit_excluded(fitted(), PRIORS)
     assert (EffectId.TYRE_SLIP not in priors.effects) is admitted
     assert EffectId.BACKLASH in priors.effects

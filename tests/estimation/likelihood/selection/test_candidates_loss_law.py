@@ -15,7 +15,7 @@ from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.priors import build_problem
-from drivetwin.estimation.likelihood.selection import loss_law
+from drivetwin.estimation.likelihood.selection import candidates
 from drivetwin.findings import render
 from drivetwin.simulation.dual_clutch import LossLaw
 from tests.estimation.likelihood.fixtures import bench, fitted, truth_of
@@ -47,7 +47,7 @@ def _said(made: Bench, fit: LikelihoodFit) -> list[str]:
 
 @pytest.mark.parametrize("true", LAWS)
 def test_a_wrong_law_is_told_with_what_the_right_one_gives(true: LossLaw) -> None:
-    wrong, right = _fit(true, loss_law.OTHER[true]), _fit(true, true)
+    wrong, right = _fit(true, candidates.OTHER[true]), _fit(true, true)
     (text,) = _said(_made(true), wrong)
     assert f"loss_law = '{true}'" in text
     assert "supports it" in text
@@ -73,6 +73,6 @@ def test_nothing_is_said_where_the_laws_are_the_same() -> None:
 def test_a_log_that_tells_neither_law_from_the_other_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(loss_law, "RULED_OUT", 1e6)
+    monkeypatch.setattr(candidates, "RULED_OUT", 1e6)
     (text,) = _said(_made("paper"), _fit("paper", "paper"))
     assert "does not decide between the laws" in text

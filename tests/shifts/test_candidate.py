@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.shifts.gear_runs import Run, detect_gear_runs
+from drivetwin.shifts.candidate import Run, detect_gear_runs
 from drivetwin.shifts.kinematics import GearboxSpeeds
 from drivetwin.shifts.settings import ShiftSettings
 

@@ -12,7 +12,7 @@ from drivetwin.dyno.actuators import Actuator
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.likelihood.data.quantization import estimate_quantization
+from drivetwin.estimation.likelihood.data.shift_record import estimate_quantization
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
