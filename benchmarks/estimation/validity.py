@@ -25,6 +25,7 @@ from drivetwin.estimation.likelihood.effects.causes import CAUSES
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
+from drivetwin.estimation.likelihood.effects.torques import REFERENCE_TORQUE
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts

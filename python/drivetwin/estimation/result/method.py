@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The estimator families, by the names used on the command line and in results.
-
-Status of an identified model.
-"""
+"""Method and status of an identification, by the names used in results."""
 
 from __future__ import annotations
 

@@ -21,6 +21,7 @@ from drivetwin.estimation.likelihood.effects.effect import (
     evaluate_operating_point,
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
+from drivetwin.estimation.likelihood.effects.torques import REFERENCE_TORQUE
 from drivetwin.estimation.result.cause import Group
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, Signal

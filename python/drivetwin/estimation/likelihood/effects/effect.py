@@ -2,6 +2,8 @@
 """Entry of an effect: meaning, prior size, columns of a fit, action in a synthetic log.
 
 Run and linear response of one shift about which the columns of effects are formed.
+
+Random walks less their means: Karhunen-Loève columns, and samples for synthetic logs.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +24,7 @@ from drivetwin.estimation.likelihood.noise.shift_response import ShiftResponse, 
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.simulation.dual_clutch import DualClutch, Trajectory
+from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 from drivetwin.vehicle.effects import EffectId
 
 MIN_SPACING_S = 1e-6
@@ -198,3 +201,43 @@ class Effect:
     def scale_amount(self, amount: float, std: float) -> float:
         """Return the size of an `amount`, in units of the columns, of the stated size `std`."""
         return std * float(np.sign(amount) * np.abs(amount) ** (1.0 / self.power))
+
+
+_STEP = 0.01
+"""Time between the points of a sample [s], short against what a shift log resolves of it."""
+
+
+def build_random_walk(progress: FloatArray, count: int, growth: float) -> list[FloatArray]:
+    """Build the first `count` columns (N,) of a random walk less its mean over a span.
+
+    Parameters
+    ----------
+    progress : share (N,) of the span that has passed, 0 to 1
+    growth : standard deviation of the walk's change over the whole span
+
+    Notes
+    -----
+    A Wiener process of variance `growth`² at the end of the span, less its mean, is the sum of
+    cosines cos(kπu) with independent amounts of standard deviation growth·√2/(kπ).
+    """
+    order = np.arange(1, count + 1)
+    sizes = growth * np.sqrt(2.0) / (order * np.pi)
+    return [size * np.cos(k * np.pi * progress) for k, size in zip(order, sizes, strict=True)]
+
+
+class WalkStream(IntEnum):
+    """Streams of random numbers, apart from the noise of the sensors and from each other."""
+
+    LOAD = 101
+    OUTPUT_TORQUE = 102
+
+
+def draw_walk(stream: WalkStream, seed: int, duration: float) -> Signal:
+    """Draw a random walk over `duration` [s], its variance 1 after 1 s, less its mean."""
+    count = int(np.ceil(duration / _STEP)) + 1
+    steps = np.random.default_rng([seed, stream]).standard_normal(count - 1) * np.sqrt(_STEP)
+    walk = np.concatenate([[0.0], np.cumsum(steps)])
+    return Signal(
+        np.linspace(0.0, (count - 1) * _STEP, count),
+        np.asarray(walk - np.mean(walk), dtype=np.float64),
+    )

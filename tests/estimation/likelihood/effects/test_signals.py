@@ -10,7 +10,7 @@ from scipy.signal import lsim
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import evaluate_operating_point
-from drivetwin.estimation.likelihood.effects.inputs import (
+from drivetwin.estimation.likelihood.effects.signals import (
     apply_pressure_delay,
     apply_torque_lag,
     build_pressure_delay,

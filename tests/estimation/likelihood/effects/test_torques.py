@@ -15,7 +15,7 @@ from drivetwin.estimation.likelihood.effects.effect import (
     OperatingPoint,
     evaluate_operating_point,
 )
-from drivetwin.estimation.likelihood.effects.load import BRAKE_DRAG
+from drivetwin.estimation.likelihood.effects.torques import BRAKE_DRAG
 from tests.estimation.likelihood.fixtures import bench, problem
 
 STD = 0.01
