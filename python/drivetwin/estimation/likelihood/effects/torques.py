@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Effects that are torques on the driveline: loads at the wheel, losses and drums in the gearbox."""
+"""Effects that are torques: loads at the wheel, losses and drums of the gearbox."""
 
 from __future__ import annotations
 
