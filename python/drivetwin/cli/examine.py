@@ -21,7 +21,7 @@ from drivetwin.report.blocks import Block, TableBlock, make_table
 if TYPE_CHECKING:
     from drivetwin.cli.identify_run import Outcome
     from drivetwin.estimation.analysis.bootstrap import Bootstrap
-    from drivetwin.estimation.analysis.friction_dependence import Departure
+    from drivetwin.estimation.analysis.friction_dependence import Dependence
     from drivetwin.estimation.analysis.profile_likelihood import Profile
     from drivetwin.estimation.result.estimate import Estimate
     from drivetwin.fit.examine import Improvement
@@ -99,7 +99,7 @@ def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
     from drivetwin.estimation.analysis.bootstrap import bootstrap
     from drivetwin.estimation.analysis.experiment_design import compute_rankings
-    from drivetwin.estimation.analysis.friction_dependence import estimate_departures
+    from drivetwin.estimation.analysis.friction_dependence import estimate_dependences
     from drivetwin.estimation.analysis.profile_likelihood import compute_profile
     from drivetwin.files import analysis_files
     from drivetwin.report.sections.identifiability import build_suggestion_blocks
@@ -117,7 +117,7 @@ def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
         yield _identify_friction(outcome, request.friction)
     if request.departures:
         with show_step("looking for what departs from the friction law"):
-            seen = estimate_departures(found)
+            seen = estimate_dependences(found)
         yield Answer(
             DEPARTURES, analysis_files.format_departures(seen), [_build_departure_table(seen)]
         )
@@ -192,7 +192,7 @@ def _build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) ->
     )
 
 
-def _build_departure_table(found: tuple[Departure, ...]) -> TableBlock:
+def _build_departure_table(found: tuple[Dependence, ...]) -> TableBlock:
     from drivetwin.estimation.analysis.friction_dependence import UNITS
     from drivetwin.estimation.result.estimate import Z95
 

@@ -65,7 +65,7 @@ class StageResults:
     """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
     their mean; empty where the shifts of a log share one."""
     cause: Cause | None = None
-    """Departure from the model that the log shows, by the likelihood method; None without one."""
+    """Model mismatch that the log shows, by the likelihood method; None without one."""
     spread: tuple[Mapping[str, PredictedSpread], ...] = ()
     """Predicted spread of the free-running simulation of each shift by signal; likelihood only."""
     several: Several | None = None

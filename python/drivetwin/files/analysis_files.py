@@ -10,7 +10,7 @@ from typing import Any
 
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin.estimation.analysis.bootstrap import Bootstrap
-from drivetwin.estimation.analysis.friction_dependence import UNITS, Departure
+from drivetwin.estimation.analysis.friction_dependence import UNITS, Dependence
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.analysis.profile_likelihood import Profile
 from drivetwin.estimation.result.suggestion import ExperimentRanking
@@ -74,7 +74,7 @@ def format_friction(one: ShapedFriction) -> str:
     )
 
 
-def format_departures(found: tuple[Departure, ...]) -> str:
+def format_departures(found: tuple[Dependence, ...]) -> str:
     """`departures.json`: drag of open clutches, and μ that goes with pressure or temperature."""
     names = ("kind", "element", "value", "std", "plausible", "text")
     rows = [

@@ -16,7 +16,7 @@ from drivetwin.dyno.actuators import Actuator, Program
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis import friction_dependence as module
-from drivetwin.estimation.analysis.friction_dependence import Departure, Kind, estimate_departures
+from drivetwin.estimation.analysis.friction_dependence import Dependence, Kind, estimate_dependences
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.identification import Identification
@@ -48,19 +48,19 @@ def _dragging() -> Identification:
         return drivetwin.identify(log, card, drivetwin.detect_shifts(log, card))
 
 
-def _by(found: tuple[Departure, ...], kind: Kind) -> dict[str, Departure]:
+def _by(found: tuple[Dependence, ...], kind: Kind) -> dict[str, Dependence]:
     return {one.element: one for one in found if one.kind is kind}
 
 
 def test_finds_the_drag_of_open_clutches() -> None:
-    told = _by(estimate_departures(_dragging()), Kind.DRAG)
+    told = _by(estimate_dependences(_dragging()), Kind.DRAG)
     for name, true in DRAG.items():
         assert told[name].text == "seen"
         assert told[name].value == pytest.approx(true, abs=3.5 * told[name].std)
 
 
 def test_sees_none_where_there_is_none() -> None:
-    found = estimate_departures(stepped())
+    found = estimate_dependences(stepped())
     assert found
     for one in found:
         assert one.text != "seen", one
@@ -82,8 +82,8 @@ def test_slow_errors_of_a_sensor_make_a_departure_less_sure(
     wrong = replace(fit, normal=replace(fit.normal, residuals=(slow,)))
     evidence = replace(found.evidence, likelihood=wrong)
     sure, unsure = (
-        estimate_departures(found),
-        estimate_departures(replace(found, evidence=evidence)),
+        estimate_dependences(found),
+        estimate_dependences(replace(found, evidence=evidence)),
     )
     for before, after in zip(sure, unsure, strict=True):
         assert after.std >= 0.99 * before.std
@@ -92,10 +92,10 @@ def test_slow_errors_of_a_sensor_make_a_departure_less_sure(
 
 def test_a_steady_temperature_tells_nothing_and_a_moving_one_is_looked_at() -> None:
     time = np.array([0.0, DURATION])
-    still = estimate_departures(stepped(), MeasuredSignal(time, np.full(2, 353.0)))
+    still = estimate_dependences(stepped(), MeasuredSignal(time, np.full(2, 353.0)))
     assert not _by(still, Kind.TEMPERATURE)
     moving = _by(
-        estimate_departures(stepped(), MeasuredSignal(time, np.array([340.0, 360.0]))),
+        estimate_dependences(stepped(), MeasuredSignal(time, np.array([340.0, 360.0]))),
         Kind.TEMPERATURE,
     )
     assert moving["B3"].std > 0.0
@@ -105,5 +105,5 @@ def test_a_steady_temperature_tells_nothing_and_a_moving_one_is_looked_at() -> N
     kept = dense[(dense < 2.0) | (dense > 3.0)]
     gappy = MeasuredSignal(kept, np.interp(kept, time, [340.0, 360.0]))
     assert gappy.gaps
-    again = _by(estimate_departures(stepped(), gappy), Kind.TEMPERATURE)
+    again = _by(estimate_dependences(stepped(), gappy), Kind.TEMPERATURE)
     assert again["B3"].std == pytest.approx(moving["B3"].std, rel=1e-3)

@@ -45,7 +45,7 @@ from drivetwin.estimation.result.verdict import VERDICT, assess, is_sensor_limit
 from drivetwin.findings import Code, explain
 from drivetwin.parameters import get_parameter_spec
 
-AGE = "te_delay"
+DELAY = "te_delay"
 REPEATS = (1, 2, 4)
 """Numbers of repetitions of the best experiment, tried in this order."""
 NO_SCALE = "an output-shaft torque sensor alone gives torques their scale"
@@ -112,7 +112,7 @@ def _compute_relative_width(one: Estimate) -> float:
     identified."""
     if one.value is None or one.std_total is None:
         return 0.0
-    whole = VERDICT.delay_identified if get_parameter_spec(one.id).stem == AGE else abs(one.value)
+    whole = VERDICT.delay_identified if get_parameter_spec(one.id).stem == DELAY else abs(one.value)
     return one.std_total / max(whole, 1e-300)
 
 
@@ -149,7 +149,7 @@ def _compute_gains(
 def _get_delay_name(fit: LikelihoodFit) -> str:
     """Return the name of the torque-delay unknown of the last log, whose sensors experiments
     share."""
-    return fit.problem.parts[-1].structure.get_unknown(AGE)
+    return fit.problem.parts[-1].structure.get_unknown(DELAY)
 
 
 def _add_delay(fit: LikelihoodFit) -> ParameterVector:
@@ -157,8 +157,8 @@ def _add_delay(fit: LikelihoodFit) -> ParameterVector:
     point, name = fit.point, _get_delay_name(fit)
     if name in point.names:
         return point
-    age = fit.problem.parts[-1].structure.get_value(point, AGE)
-    return ParameterVector((*point.names, name), np.append(point.values, age))
+    delay = fit.problem.parts[-1].structure.get_value(point, DELAY)
+    return ParameterVector((*point.names, name), np.append(point.values, delay))
 
 
 def _compute_gain(plan: ExperimentPlan, shift: str) -> _InformationGain | None:
@@ -205,7 +205,7 @@ class _Linearisation:
     def get_row(self, name: str, names: tuple[str, ...]) -> FloatArray:
         """Return the derivative (r,) of a parameter by the unknowns `names`."""
         row = np.zeros(len(names))
-        if name == make_log_id(AGE, self.fit.problem.parts[-1].structure.log):
+        if name == make_log_id(DELAY, self.fit.problem.parts[-1].structure.log):
             row[names.index(_get_delay_name(self.fit))] = 1.0
             return row
         row[: len(self.fit.point.names)] = self.jacobian[list(self.values).index(name)]
@@ -228,8 +228,8 @@ def _rank_for_parameter(
     one: Estimate, base: _Linearisation, gains: Sequence[_InformationGain]
 ) -> ExperimentRanking:
     half = np.inf if one.std_total is None else Z95 * one.std_total
-    fit, told = base.fit, base.values
-    if one.id not in told:
+    fit, values = base.fit, base.values
+    if one.id not in values:
         return ExperimentRanking(one.id, one.verdict, half, (), NO_SCALE)
     systematic = one.std_systematic or 0.0
     if one.std_noise is not None and is_sensor_limited(one.std_noise, systematic):
@@ -243,7 +243,7 @@ def _rank_for_parameter(
     for gain in gains:
         for repeats in REPEATS:
             std = loud * float(np.sqrt(row @ _compute_covariance(fit, names, gain, repeats) @ row))
-            verdict = assess(one.id, told[one.id], std, "", systematic).verdict
+            verdict = assess(one.id, values[one.id], std, "", systematic).verdict
             prospect = ExpectedPrecision(
                 gain.experiment,
                 repeats,

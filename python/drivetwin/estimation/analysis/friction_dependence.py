@@ -64,8 +64,11 @@ UNITS: Mapping[Kind, str] = {Kind.DRAG: "N*m*s/rad", Kind.PRESSURE: "1/Pa", Kind
 
 
 @dataclass(frozen=True)
-class Departure:
-    """One departure of one element: `value` and `std` in UNITS, `plausible` its prior's spread."""
+class Dependence:
+    """One dependence of the friction of an element: `value` and `std` in UNITS.
+
+    `plausible` is the spread of its prior.
+    """
 
     kind: Kind
     element: str
@@ -85,7 +88,7 @@ class Departure:
 
 @dataclass(frozen=True, eq=False)
 class _Effect:
-    """A departure's torque over the steps (N-1,) by part, per unit."""
+    """A dependence's torque over the steps (N-1,) by part, per unit."""
 
     kind: Kind
     element: str
@@ -93,9 +96,9 @@ class _Effect:
     plausible: float
 
 
-def estimate_departures(
+def estimate_dependences(
     found: Identification, temperature: MeasuredSignal | None = None
-) -> tuple[Departure, ...]:
+) -> tuple[Dependence, ...]:
     """Estimate the deviations of all elements of a likelihood identification.
 
     `temperature` [K] is the oil temperature over the log; it varies slowly, so gaps are
@@ -112,7 +115,7 @@ def estimate_departures(
         step = _compute_step(again, largest, temperature, total)
     std = np.sqrt(np.diag(step.covariance))
     return tuple(
-        Departure(e.kind, e.element, float(value), float(error), e.plausible)
+        Dependence(e.kind, e.element, float(value), float(error), e.plausible)
         for e, value, error in zip(step.effects, total, std, strict=True)
     )
 

@@ -77,12 +77,12 @@ def compute_profile(found: Identification, parameter: str) -> Profile:
     IdentificationError where the identification is by another method.
     """
     fit, signals = get_likelihood_fit(found)
-    told = compute_parameters(fit.problem, fit.point, signals)
-    if parameter not in told:
+    values = compute_parameters(fit.problem, fit.point, signals)
+    if parameter not in values:
         raise InputError(
-            f"the fit has no parameter {parameter!r}", f"choose one of {', '.join(told)}"
+            f"the fit has no parameter {parameter!r}", f"choose one of {', '.join(values)}"
         )
-    held = _FixedParameter(fit, signals, list(told).index(parameter), parameter)
+    held = _FixedParameter(fit, signals, list(values).index(parameter), parameter)
     if held.std == 0.0:
         raise InputError(
             f"{parameter} is fixed by design",

@@ -11,7 +11,7 @@ driveline (THEORY section 3), with i_out and α of both:
 
     T_o + Jo' ω_out' = (i_1/α_1)·(η T_e - J' ω_e') + (i_2 - i_1 α_2/α_1)·T_2
 
-This holds whether the other clutch locks, slips or is open. η, J' and the age of T_e are unknown
+This holds whether the other clutch locks, slips or is open. η, J' and the delay of T_e are unknown
 constants. It is integrated over time, so that no speed is differentiated, and solved for ω_e, whose
 noise is by far the largest: as a regressor it would bias J'.
 """

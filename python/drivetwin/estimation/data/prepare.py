@@ -42,7 +42,7 @@ from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 NO_AGE = PriorValue(0.0)
-"""Age of a torque [s] that is computed from speeds."""
+"""Delay of a torque [s] that is computed from speeds."""
 
 
 ENGINE_SPEEDS = ("engine_speed", "input_speed")
@@ -312,7 +312,7 @@ def collect_tolerances(
     """Return the card's sensor tolerances by role, with ω_e from the speed sensor that is used.
 
     A speed sensor that is not used has none. If the log's table shows values up to a row late, the
-    age of each channel is uncertain by that.
+    delay of each channel is uncertain by that.
     """
     return _collect_tolerances(log, refer_to_turbine(log, card, shift), card)
 

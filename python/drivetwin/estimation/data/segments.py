@@ -23,7 +23,7 @@ class MomentumSettings:
 
     `width`, `step` of the Hann windows; in a phase shorter than two widths the window is
     `share` of the phase. `margin` keeps clear of lock and break-away. `delay_prior` is the
-    plausible age of an engine torque value on a CAN bus; `delay_grid` the ages scanned.
+    plausible delay of an engine torque value on a CAN bus; `delay_grid` the delays scanned.
     """
 
     width: float = 0.4

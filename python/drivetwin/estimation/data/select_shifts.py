@@ -90,17 +90,17 @@ def estimate_common_vehicle(loads: Sequence[ConstantLoadFit]) -> tuple[float, fl
     Both are medians weighted by information, because a change of load during a shift biases J3 or
     the growth of this shift. Returns None if there are too few shifts for a median.
     """
-    told = [one for one in loads if min(one.J_vehicle[1], one.growth[1]) > 0.0]
-    if len(told) < AGREEING:
+    sound = [one for one in loads if min(one.J_vehicle[1], one.growth[1]) > 0.0]
+    if len(sound) < AGREEING:
         return None
-    return _compute_weighted_median([one.J_vehicle for one in told]), _compute_weighted_median(
-        [one.growth for one in told]
+    return _compute_weighted_median([one.J_vehicle for one in sound]), _compute_weighted_median(
+        [one.growth for one in sound]
     )
 
 
-def _compute_weighted_median(told: Sequence[tuple[float, float]]) -> float:
+def _compute_weighted_median(values: Sequence[tuple[float, float]]) -> float:
     """Median of values weighted by the inverse of their standard deviations."""
-    value, std = np.array(sorted(told)).T
+    value, std = np.array(sorted(values)).T
     share = np.cumsum(1.0 / std)
     return float(value[np.searchsorted(share, 0.5 * share[-1])])
 

@@ -148,7 +148,7 @@ def _split(part: ShiftTerm, mean: FloatArray, std: FloatArray) -> dict[str, Pred
     return found
 
 
-AGE = "te_delay"
+DELAY = "te_delay"
 WITH_ETA = "likelihood over η, times η from design"
 """Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_PRIOR = "likelihood with design prior"
@@ -337,8 +337,8 @@ def _estimate_fixed(
             ratio = estimates.get(name + OVER_ETA)
             found[name] = _estimate_without_scale(name, eta, ratio, drivelines[0].find_prior(name))
     for one in (part.structure for part in fit.problem.parts):
-        if one.get_unknown(AGE) not in fit.point.names and AGE not in drivelines[0].known:
-            name = make_log_id(AGE, one.log)
+        if one.get_unknown(DELAY) not in fit.point.names and DELAY not in drivelines[0].known:
+            name = make_log_id(DELAY, one.log)
             found[name] = refuse_parameter(name, METHOD, explain(Code.DELAY_NOT_EXCITED))
     return found
 

@@ -190,10 +190,10 @@ class ShiftModel:
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
     start unknowns of this shift. `mean_speed` is that of the wheel over the log [rad/s], at which
     T_v/i_f holds where the load grows with the speed. A `tie` takes the place of the unknown J_e.
-    `log` is the number of the log among several, 0 where it is the only one. `departure` is how
-    the load of this shift departs from that of its log: a factor by unknown; empty where it does
-    not. `plant_effect` is an effect that the plant has beside the dual clutch. `partners` are the
-    elements whose law an element without a law of its own follows, by its name.
+    `log` is the number of the log among several, 0 where it is the only one. `load_factors` are
+    the factors by unknown of the difference of the load of this shift from that of its log; empty
+    without one. `plant_effect` is an effect that the plant has beside the dual clutch. `partners`
+    are the elements whose law an element without a law of its own follows, by its name.
     """
 
     driveline: KnownDriveline
@@ -203,7 +203,7 @@ class ShiftModel:
     mean_speed: float
     tie: Tie | None = None
     log: int = 0
-    departure: Mapping[str, float] = field(default_factory=dict)
+    load_factors: Mapping[str, float] = field(default_factory=dict)
     plant_effect: PlantEffect | None = None
     partners: Mapping[str, str] = field(default_factory=dict)
 
@@ -297,8 +297,8 @@ class ShiftModel:
     def compute_load(self, point: ParameterVector) -> float:
         """Compute the load of this shift at the output shaft [N m], at the mean speed of its
         log."""
-        departure = sum(factor * point[name] for name, factor in self.departure.items())
-        return self.get_value(point, "Tv_over_if") + departure
+        difference = sum(factor * point[name] for name, factor in self.load_factors.items())
+        return self.get_value(point, "Tv_over_if") + difference
 
     def _build_element(self, point: ParameterVector, one: ShiftElementKinematics) -> ShiftElement:
         c, drop, v, ln_v_s = self.get_law(point, one.name)
@@ -352,7 +352,7 @@ def retract(point: ParameterVector, step: FloatArray) -> FloatArray:
 
 
 def build_load_deviations(loads: Sequence[float]) -> dict[str, float]:
-    """Start values of T_v/i_f and of the departures of all shifts of one log with `loads` [N m]."""
+    """Build start values of T_v/i_f and of the load deviations of the shifts of a log [N m]."""
     mean = float(np.mean(loads))
     own = {f"start{k}.{LOAD_DEVIATION}": load - mean for k, load in enumerate(loads)}
     return {"Tv_over_if": mean, **own}

@@ -130,7 +130,7 @@ def build_problem(
     """Build the fit of all shifts of one or several logs, and its initial point.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
-    start of each shift's run is read from the first samples. The age of the engine torque is held
+    start of each shift's run is read from the first samples. The delay of the engine torque is held
     where no torque step shows it. Shifts of one log stand together; on a `hilly` road each has a
     load of its own, unless the load is known beforehand. Raises IdentificationError where a shift
     holds too little.
@@ -151,12 +151,12 @@ def build_problem(
     inertias = list_gear_inertias(signals, drivelines)
     tie = build_tie(inertias)
     still = [s for s in signals if not is_delay_identifiable(s.engine_torque)]
-    ages = {map_log_names(s.log).get("te_delay", "te_delay") for s in still}
-    untold = {"eta": not signals[0].scale_known, "J_e": tie is not None}
-    names = [n for n in names if not untold.get(n, n in ages)]
+    delays = {map_log_names(s.log).get("te_delay", "te_delay") for s in still}
+    absent = {"eta": not signals[0].scale_known, "J_e": tie is not None}
+    names = [n for n in names if not absent.get(n, n in delays)]
     names += [n for n in _expand_logs((TE_OFFSET, AERO), logs) if n in priors]
     fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_fixed(p)}
-    departures = (
+    load_factors = (
         _build_load_factors(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
     )
     parts, start = [], {n: guess.get(n, 0.0) for n in names}
@@ -165,7 +165,7 @@ def build_problem(
         record = build_record(s, span, {e.name: e.P0 for e in (d.offgoing, d.oncoming)})
         same = [one for one in signals if one.log == s.log]
         own = {name: fixed[n] for name, n in map_log_names(s.log).items() if n in fixed}
-        departure = departures.get(k, {})
+        own_load = load_factors.get(k, {})
         structure = ShiftModel(
             d,
             loss_law,
@@ -174,7 +174,7 @@ def build_problem(
             compute_mean_speed(same, d.i_f),
             tie,
             s.log,
-            departure,
+            own_load,
             partners=partners,
         )
         parts.append(ShiftTerm.from_sensor_noise(structure, record))
@@ -183,7 +183,7 @@ def build_problem(
         torque = first.get("output_torque", guess["Tv_over_if"])
         values = (first["output_speed"], wheel, torque / guess["k_o"])
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
-    start |= {n: guess.get(n, 0.0) for each in departures.values() for n in each}
+    start |= {n: guess.get(n, 0.0) for each in load_factors.values() for n in each}
     begin = ParameterVector(tuple(start), np.array(list(start.values())))
     lower, upper = _restrict_to_design(get_bounds(begin.names), begin, priors)
     point = begin.replace_values(np.clip(begin.values, lower, upper))
@@ -352,8 +352,8 @@ def collect_direct_priors(driveline: KnownDriveline, scale_known: bool) -> dict[
     found = {}
     for name, prior in driveline.known.items():
         unknown = name.removesuffix(OVER_ETA)
-        told = scale_known if unknown == name else not scale_known
-        if unknown in COMMON and (told or unknown == "te_delay"):
+        is_stated = scale_known if unknown == name else not scale_known
+        if unknown in COMMON and (is_stated or unknown == "te_delay"):
             found[unknown] = prior
     return found
 

@@ -195,12 +195,13 @@ class ShiftTerm:
     def _compute_torque_changes(self, point: ParameterVector) -> dict[str, FloatArray]:
         """Compute the change (N-1,) of the acting engine torque per unit of its own unknowns.
 
-        The rate is that of the torque without noise: jitter has no age, and would seem to show one.
+        The rate is that of the torque without noise: jitter would seem to show a delay.
         """
         found = {}
-        age, offset = self.structure.get_unknown("te_delay"), self.structure.get_unknown(TE_OFFSET)
-        if age in point.names:
-            found[age] = self.record.compute_torque_rate(point[age])
+        delay = self.structure.get_unknown("te_delay")
+        offset = self.structure.get_unknown(TE_OFFSET)
+        if delay in point.names:
+            found[delay] = self.record.compute_torque_rate(point[delay])
         if offset in point.names:
             found[offset] = np.full(self.record.time.size - 1, -1.0)
         return found
@@ -250,9 +251,9 @@ class ShiftTerm:
         )
         if not noise:
             return self
-        age = self.structure.get_value(point, "te_delay")
+        delay = self.structure.get_value(point, "te_delay")
         return (
-            replace(self, record=self.record.subtract_noise(noise, age))._update_weighting(point)
+            replace(self, record=self.record.subtract_noise(noise, delay))._update_weighting(point)
             or self
         )
 
@@ -276,11 +277,11 @@ class ShiftTerm:
     def add_to_inputs(self, point: ParameterVector, changes: Mapping[str, Signal]) -> ShiftTerm:
         """Return the part driven by inputs with `changes` by name, at the instants at which they
         act at `point`."""
-        record, age = self.record, self.structure.get_value(point, "te_delay")
+        record, delay = self.record, self.structure.get_value(point, "te_delay")
         torque, pressures = record.engine_torque, dict(record.pressures)
         for name, change in changes.items():
             old = torque if name == TORQUE else pressures[name]
-            acts = old.time - age if name == TORQUE else old.time
+            acts = old.time - delay if name == TORQUE else old.time
             values = old.values + np.interp(acts, change.time, change.values)
             new = replace(old, values=values)
             if name == TORQUE:

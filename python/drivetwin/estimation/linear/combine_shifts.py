@@ -64,13 +64,13 @@ def _estimate_scatter(name: str, value: float, shifts: Sequence[IntegralShift]) 
 
     What a shift alone has, and the load, which may be a shift's own, have none.
     """
-    told = [
+    deviations = [
         (shift.values[k] - value) / np.sqrt(shift.covariance[k, k])
         for shift in shifts
         if name in shift.ids and name != LOAD
         for k in (shift.ids.index(name),)
     ]
-    square, freedom = float(np.sum(np.square(told))), len(told) - 1
+    square, freedom = float(np.sum(np.square(deviations))), len(deviations) - 1
     if freedom < 1 or square < chdtri(freedom, COMBINATION.min_agreement):
         return 1.0
     return float(np.sqrt(square / freedom))
@@ -99,8 +99,8 @@ def _merge_separate_loads(
     rows[first, [first, *others]] = 1.0 / len(shifts)
     kept = [k for k in range(len(ids)) if k not in others]
     rows = rows[kept]
-    told = tuple(LOAD if k == first else ids[k] for k in kept)
-    return told, rows @ values, rows @ covariance @ rows.T
+    names = tuple(LOAD if k == first else ids[k] for k in kept)
+    return names, rows @ values, rows @ covariance @ rows.T
 
 
 def _compute_loose_variances(shift: IntegralShift) -> FloatArray:

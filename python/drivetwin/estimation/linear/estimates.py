@@ -408,11 +408,11 @@ def _estimate_systematic(
         ) -> FloatArray:
             run = identify_shift(x, d, start, base.load.holds_at)
             found = dict(zip(run.ids, run.values, strict=True))
-            told = [found.get(k, v) for k, v in zip(base.ids, base.values, strict=True)]
+            computed = [found.get(k, v) for k, v in zip(base.ids, base.values, strict=True)]
             if base.friction is None:
-                return np.array(told)
+                return np.array(computed)
             fit = base.friction if run.friction is None else run.friction
-            return np.append(told, evaluate_fitted_stribeck(fit, base.friction.curve.slip))
+            return np.append(computed, evaluate_fitted_stribeck(fit, base.friction.curve.slip))
 
         std = estimate_systematic_std(values, s, design.sensors)
         for name, value in zip(base.ids, std[: len(base.ids)], strict=True):

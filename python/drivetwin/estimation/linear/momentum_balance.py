@@ -11,7 +11,7 @@ The equations are linear in (η, Je, Jo′) and hold as long as one element alon
 the shift's own speed change excites Je even where the engine torque stands still. The torque
 phase is left out: there two unknown torques act. Windows never straddle a phase boundary.
 Drum inertias of the shift elements (THEORY section 2) enter as further linear parameters with
-their design priors; Jo′ has one too. The age of the engine torque is estimated with the rest.
+their design priors; Jo′ has one too. The delay of the engine torque is estimated with the rest.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ DELAY = DelaySettings()
 
 @dataclass(frozen=True, eq=False)
 class DelayScan:
-    """Q of the regression over the assumed age of the engine torque: `delay` [s], `q`, (n,).
+    """Q of the regression over the assumed delay of the engine torque: `delay` [s], `q`, (n,).
 
-    `best` is the age at the minimum, None where the engine torque moves too little to show it.
+    `best` is the delay at the minimum, None where the engine torque moves too little to show it.
     """
 
     delay: FloatArray
@@ -102,7 +102,7 @@ class MomentumFit:
 
 
 def list_momentum_names(driveline: KnownDriveline) -> tuple[str, ...]:
-    """Parameters of the regression: η, Je, Jo′, age and mean rounding error of T_e, drums."""
+    """Parameters of the regression: η, Je, Jo′, delay and mean rounding error of T_e, drums."""
     return (
         "eta",
         "J_e",
@@ -215,7 +215,7 @@ def compute_prior_std(prior: PriorValue) -> float:
 def _scan_delays(
     equations: _Equations, theta: FloatArray, prior: Prior, delays: tuple[float, ...]
 ) -> DelayScan:
-    """Q over the age of the engine torque, the other parameters fitted at each age.
+    """Q over the delay of the engine torque, the other parameters fitted at each delay.
 
     The weighting is that at `theta`; the equations are then linear in the rest.
     """
@@ -238,8 +238,8 @@ def _scan_delays(
         design = np.column_stack([np.concatenate([drive, pad]), rows[:, 1:]])
         solution = np.linalg.lstsq(design, -rows[:, 0], rcond=None)[0]
         q.append(float(np.sum((design @ solution + rows[:, 0]) ** 2)))
-    ages, values = np.asarray(delays), np.asarray(q)
-    return DelayScan(ages, values, interpolate_parabola_minimum(ages, values))
+    grid, values = np.asarray(delays), np.asarray(q)
+    return DelayScan(grid, values, interpolate_parabola_minimum(grid, values))
 
 
 def interpolate_parabola_minimum(x: FloatArray, y: FloatArray) -> float:
@@ -258,7 +258,7 @@ def estimate_momentum_inertia(
     settings: MomentumSettings,
     start_inertia: float,
 ) -> MomentumFit:
-    """Estimate η, Je, Jo′, age of T_e and drums over the whole shift, with their covariance.
+    """Estimate η, Je, Jo′, delay of T_e and drums over the whole shift, with their covariance.
 
     `start_inertia` [kg m^2] is any value within the plausible range of J′.
     """

@@ -78,9 +78,9 @@ def _fit_ring(
     J4 = float(_compute_gear_inertia(driveline, momentum, ratio) @ momentum.fit.theta) * ratio**2
     J5 = load.J_vehicle / driveline.i_f**2
     gain = momentum.get_value("eta") * ratio * J5 / (J4 + J5)
-    shift, measured, age = signals.shift, signals.engine_torque, momentum.get_value("te_delay")
+    shift, measured, delay = signals.shift, signals.engine_torque, momentum.get_value("te_delay")
     after = min(RING_DOWN.latest_start, MOMENTUM.compute_guard("lockup", shift))
-    acting = MeasuredSignal(measured.time - age, measured.values, measured.sigma)
+    acting = MeasuredSignal(measured.time - delay, measured.values, measured.sigma)
     return fit_ringdown(
         signals.output_torque,
         shift.lockup_time,
@@ -177,7 +177,7 @@ def identify_shift(
         keep = [k for k, name in enumerate(ids) if name != "te_delay"]
         ids = tuple(ids[k] for k in keep)
         values, covariance = values[keep], covariance[np.ix_(keep, keep)]
-        refusals["te_delay"] = "the engine torque moves too little for its age to show"
+        refusals["te_delay"] = "the engine torque moves too little for its delay to show"
     priors = {name: one for name, one in momentum.priors.items() if name in ids}
     if AERO in ids:
         priors[AERO] = PriorValue(0.0, LOAD_BALANCE.aero_std)

@@ -48,7 +48,7 @@ from drivetwin.estimation.result.verdict import compute_covariance_root, join_re
 from drivetwin.findings import Code, explain
 
 
-def apply_consistency(told: EstimateSet, tested: Consistency) -> EstimateSet:
+def apply_consistency(joint: EstimateSet, tested: Consistency) -> EstimateSet:
     """Apply the outcome of the homogeneity test; unchanged if the logs agree.
 
     A parameter on which they do not is weak at best, and its interval is as many times wider as
@@ -57,13 +57,13 @@ def apply_consistency(told: EstimateSet, tested: Consistency) -> EstimateSet:
     doubtful = tested.doubtful
     estimates = {
         name: _downgrade(one, doubtful[name]) if name in doubtful else one
-        for name, one in told.estimates.items()
+        for name, one in joint.estimates.items()
     }
     friction = {
-        name: _widen(curve, doubtful.get(f"mu.{name}")) for name, curve in told.friction.items()
+        name: _widen(curve, doubtful.get(f"mu.{name}")) for name, curve in joint.friction.items()
     }
-    findings = told.findings if tested.agree else (tested.finding, *told.findings)
-    return replace(told, estimates=estimates, friction=friction, findings=findings)
+    findings = joint.findings if tested.agree else (tested.finding, *joint.findings)
+    return replace(joint, estimates=estimates, friction=friction, findings=findings)
 
 
 def _downgrade(one: Estimate, move: LogPull) -> Estimate:
@@ -108,7 +108,7 @@ def _pool(curves: Sequence[FrictionCurve]) -> FrictionCurve:
     )
 
 
-TOLD = 0.02
+LEAST_SHARE = 0.02
 """Share of the joint information on a direction below which a log is uninformative."""
 
 
@@ -134,9 +134,9 @@ def check_consistency(
     power = compute_variance_inflation(fit, np.eye(len(covariance))[shared])
     square /= power
     rows = _compute_rows(fit, signals, friction)
-    told = {name: row[shared] @ root for name, row in rows.items()}
+    projected = {name: row[shared] @ root for name, row in rows.items()}
     p = float(chdtrc(freedom, square)) if freedom else 1.0
-    return Consistency(square, freedom, p, _find_discrepancies(pulls, told, power))
+    return Consistency(square, freedom, p, _find_discrepancies(pulls, projected, power))
 
 
 def find_shared(fit: LikelihoodFit) -> list[int]:
@@ -167,8 +167,10 @@ def _compute_column_products(
             f"the simulation of log {log} fails at the common minimum", "identify it by itself"
         )
     rest = [k for k in range(size) if k not in shared and normal.information[k, k] > 0.0]
-    told = root.T @ reduce_information(normal.information, list(shared), rest) @ root
-    return LogScore(log, 0.5 * (told + told.T), root.T @ normal.gradient[list(shared)])
+    information = root.T @ reduce_information(normal.information, list(shared), rest) @ root
+    return LogScore(
+        log, 0.5 * (information + information.T), root.T @ normal.gradient[list(shared)]
+    )
 
 
 def compute_homogeneity(pulls: Sequence[LogScore]) -> tuple[float, int]:
@@ -176,7 +178,7 @@ def compute_homogeneity(pulls: Sequence[LogScore]) -> tuple[float, int]:
     rows, targets = [], []
     for one in pulls:
         power, directions = np.linalg.eigh(one.information)
-        keep = power > TOLD
+        keep = power > LEAST_SHARE
         weight = np.sqrt(power[keep])
         rows.append(weight[:, None] * directions[:, keep].T)
         targets.append(-(directions[:, keep].T @ one.pull) / weight)
@@ -187,18 +189,18 @@ def compute_homogeneity(pulls: Sequence[LogScore]) -> tuple[float, int]:
 
 
 def _find_discrepancies(
-    pulls: Sequence[LogScore], told: Mapping[str, FloatArray], widened: float
+    pulls: Sequence[LogScore], projected: Mapping[str, FloatArray], widened: float
 ) -> tuple[LogPull, ...]:
     """Find the largest discrepancy of every parameter over the logs."""
     largest: dict[str, LogPull] = {}
     for one in pulls:
         power, directions = np.linalg.eigh(one.information)
-        share = np.clip(power, 0.0, 1.0 - TOLD)
-        for name, row in told.items():
+        share = np.clip(power, 0.0, 1.0 - LEAST_SHARE)
+        for name, row in projected.items():
             along = directions.T @ row
             move = -along @ ((directions.T @ one.pull) / (1.0 - share))
             std = np.sqrt(widened * along**2 @ (share / (1.0 - share)))
-            z = float(move / std) if std > TOLD * np.linalg.norm(row) else 0.0
+            z = float(move / std) if std > LEAST_SHARE * np.linalg.norm(row) else 0.0
             if name not in largest or abs(z) > abs(largest[name].z):
                 largest[name] = LogPull(name, one.log, z)
     return tuple(largest.values())

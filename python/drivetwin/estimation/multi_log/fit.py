@@ -2,7 +2,7 @@
 """Several logs of one vehicle in one likelihood.
 
 One mechanism with the fit of one log: its problem takes the shifts of all logs. What belongs to
-the driveline is one unknown for all; load, age and rounding of the engine torque are unknowns of
+the driveline is one unknown for all; load, delay and rounding of the engine torque are unknowns of
 each log (parametrization.py). Noise levels are estimated log by log. A design prior counts once. A
 sensor's gain or offset error is the same in all logs and is not averaged out: its shift of the
 common minimum is summed over all parts (sensor_tolerance.py). Each log is fitted alone first, to
@@ -239,7 +239,7 @@ def _join_results(
         findings=joint.findings,
         assumptions=(
             f"{', '.join(names)} are of one vehicle in one state: they share all parameters but "
-            "load and age of the engine torque",
+            "load and delay of the engine torque",
             *agreed,
             *first.assumptions,
         ),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Prediction bounds for a shift that the fit has not used.
 
-What the shift's log has of its own (load, age of the torque, state at the start) is unknown to
+What the shift's log has of its own (load, delay of the torque, state at the start) is unknown to
 the fit. It is estimated from the gear held before the shift, the shared parameters θ staying as
 they are; so their errors move it along, dξ = -H_ξξ⁻¹ H_ξθ dθ with H the information of that
 stretch. Simulated from the measured inputs, the shift is then missed by
@@ -86,7 +86,7 @@ def predict_shifts(
     )
     point, own = before.point, map_log_names(held[0].log)
     std = np.sqrt(np.diag(before.own))
-    told = {
+    known = {
         name: (point[own[name]], float(std[unseen.index(k)]))
         for name in LOG_SPECIFIC
         if name in own and own[name] in point.names
@@ -97,7 +97,7 @@ def predict_shifts(
     rng = np.random.default_rng(seed)
     return tuple(
         ShiftPrediction(
-            told,
+            known,
             part.structure.mean_speed,
             float(part.record.time[0]),
             part.structure.build_start(point),

@@ -97,7 +97,7 @@ def _integrate_hann(u: FloatArray) -> FloatArray:
 def build_hann_kernels(time: FloatArray, windows: Windows, shift: float = 0.0) -> Kernels:
     """Hann kernels ψ = sin²(πu), u = (t - start)/width, on a channel with stamps `time` (n,).
 
-    A sample stamped t is taken to show the instant t - `shift` (the age of the value). `psi` is
+    A sample stamped t is taken to show the instant t - `shift` (the delay of the value). `psi` is
     the trapezoidal sum, scaled to be exact for a constant; `slope` is exact for a signal that is
     linear between its samples, so a large constant speed leaves nothing behind. Windows must lie
     between the first and the last sample; scaling hides it where one does not. Raises

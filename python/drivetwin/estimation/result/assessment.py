@@ -80,8 +80,8 @@ class FittedParameters:
         note = self.notes[name].reason if name in self.notes else ""
         if prior is None:
             return assess(name, value, std, self.method, systematic, note)
-        told = name, value, std
-        return assess_with_prior(told, prior, self.prior_method, systematic, note)
+        computed = name, value, std
+        return assess_with_prior(computed, prior, self.prior_method, systematic, note)
 
 
 def collect_fill_pressures(drivelines: Sequence[KnownDriveline], code: Code) -> dict[str, Estimate]:

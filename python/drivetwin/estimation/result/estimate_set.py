@@ -47,7 +47,7 @@ class EstimateSet:
     spread: tuple[Mapping[str, PredictedSpread], ...] = ()
     """Predicted spread of the free-running simulation of each shift by signal; likelihood only."""
     cause: Cause | None = None
-    """Departure from the model that the log shows; likelihood method only."""
+    """Model mismatch that the log shows; likelihood method only."""
     joint: JointCovariance | None = None
     """Total covariance of parameters and friction laws; likelihood method only."""
     numbers: Mapping[str, CardNumber] = field(default_factory=dict)

@@ -162,19 +162,19 @@ def apply_contradictions(
 
     Such are its own, by `method`, and those that would leave their interval without it.
     """
-    told = dict(estimates)
+    judged = dict(estimates)
     for one in found:
         reason = explain(Code.LOG_CONTRADICTS_CARD)
-        told[one.id] = replace(told[one.id], verdict=Verdict.WEAK, method=method, reason=reason)
+        judged[one.id] = replace(judged[one.id], verdict=Verdict.WEAK, method=method, reason=reason)
         for name, free in one.without.items():
-            other = told[name]
+            other = judged[name]
             if name == one.id or other.value is None or other.std_total is None:
                 continue
             if abs(free - other.value) > Z95 * other.std_total:
                 value = Number(free, other.unit)
                 why = explain(Code.DEPENDS_ON_PRIOR, prior=one.id, value=value)
-                told[name] = reject_identified(other, why)
-    return told
+                judged[name] = reject_identified(other, why)
+    return judged
 
 
 def report_refined(

@@ -88,8 +88,8 @@ class ExperimentRanking:
     def best(self) -> ExpectedPrecision | None:
         """First experiment that narrows the interval to `NARROWER` of its present width or less."""
         for one in self.prospects:
-            told = one.verdict is not Verdict.NOT_IDENTIFIABLE
-            if told and one.half_width <= NARROWER * self.half_width:
+            is_identifiable = one.verdict is not Verdict.NOT_IDENTIFIABLE
+            if is_identifiable and one.half_width <= NARROWER * self.half_width:
                 return one
         return None
 

@@ -135,7 +135,7 @@ def assess(
 
 
 def assess_with_prior(
-    told: tuple[str, float, float],
+    computed: tuple[str, float, float],
     design: PriorValue,
     method: str,
     std_systematic: float | None = None,
@@ -148,7 +148,7 @@ def assess_with_prior(
     The verdict is that of the design value where the log adds little. A value is never withheld
     for its width: without the log there would be the design value, which is known less.
     """
-    name, value, std = told
+    name, value, std = computed
     spec = declared or get_parameter_spec(name)
     if design.std == 0.0:
         return from_prior(name, PriorValue(value), Code.FIXED_BY_CARD)
@@ -214,16 +214,16 @@ def apply_errors(
 
     Of several errors of one code without a parameter the first is the reason.
     """
-    told, seen = dict(estimates), set[Code]()
+    judged, seen = dict(estimates), set[Code]()
     for one in findings:
         if one.severity is not Severity.ERROR:
             continue
-        if one.subject in told:
-            told[one.subject] = reject_identified(told[one.subject], one.cause)
+        if one.subject in judged:
+            judged[one.subject] = reject_identified(judged[one.subject], one.cause)
         elif one.code not in seen:
             seen.add(one.code)
-            told = {name: reject_identified(each, one.cause) for name, each in told.items()}
-    return told
+            judged = {name: reject_identified(each, one.cause) for name, each in judged.items()}
+    return judged
 
 
 def join_reasons(*reasons: str) -> str:

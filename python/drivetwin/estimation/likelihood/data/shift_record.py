@@ -166,20 +166,20 @@ class ShiftRecord(ComparedOutputs):
             found, engine_torque=replace(torque, values=torque.values + self.bend), curved=True
         )
 
-    def interpolate_bend(self, age: float) -> FloatArray:
+    def interpolate_bend(self, delay: float) -> FloatArray:
         """Compute the difference (N-1,) of a curved engine torque from a straight one over each
         step."""
         middle = 0.5 * (self.time[1:] + self.time[:-1])
-        return np.interp(middle, self.engine_torque.time - age, self.bend)
+        return np.interp(middle, self.engine_torque.time - delay, self.bend)
 
-    def subtract_noise(self, noise: Mapping[str, FloatArray], age: float) -> ShiftRecord:
+    def subtract_noise(self, noise: Mapping[str, FloatArray], delay: float) -> ShiftRecord:
         """Subtract the expected `noise` (N-1,) per step of the grid from the inputs as read.
 
         It takes the place of what was expected before. Of a pressure's noise only the part that
         passes the local cubic still drives the run.
         """
         torque = self.engine_torque
-        own = {TORQUE: _average_at_samples(self.time, noise[TORQUE], torque.time - age)}
+        own = {TORQUE: _average_at_samples(self.time, noise[TORQUE], torque.time - delay)}
         for name, p in self.pressures.items():
             own[name] = smooth_local_cubic(
                 p.time, _average_at_samples(self.time, noise[name], p.time)
@@ -192,12 +192,12 @@ class ShiftRecord(ComparedOutputs):
         torque = driving.pop(TORQUE)
         return replace(self, engine_torque=torque, pressures=driving, held_back=held)
 
-    def interpolate_held_back(self, age: float) -> dict[str, FloatArray]:
+    def interpolate_held_back(self, delay: float) -> dict[str, FloatArray]:
         """Compute the held-back part of each input (N-1,) in the middle of each step of the
         grid."""
         middle = 0.5 * (self.time[1:] + self.time[:-1])
         stamps = {name: p.time for name, p in self.pressures.items()}
-        stamps[TORQUE] = self.engine_torque.time - age
+        stamps[TORQUE] = self.engine_torque.time - delay
         return {name: np.interp(middle, stamps[name], v) for name, v in self.held_back.items()}
 
     @property
@@ -225,7 +225,7 @@ class ShiftRecord(ComparedOutputs):
         """Compute the noise of the engine torque over each step per that of a compared sample (N-1,
         size).
 
-        None where the torque has a sensor of its own. One that is computed from speeds has no age.
+        None where the torque has a sensor of its own. One that is computed from speeds has none.
         """
         if self.of_speeds is None:
             return None
@@ -253,11 +253,11 @@ class ShiftRecord(ComparedOutputs):
         of_speed = _build_interpolation(self.time[out.place], torque, (first, self.size))
         return csr_array(of_speed * slope[:, None])
 
-    def compute_torque_rate(self, age: float) -> FloatArray:
+    def compute_torque_rate(self, delay: float) -> FloatArray:
         """Compute the rate of the engine torque [N m/s] as it acts over each step of the grid
         (N-1,)."""
         signal = self.steady_torque
-        ends = np.interp(self.time + age, signal.time, signal.values)
+        ends = np.interp(self.time + delay, signal.time, signal.values)
         return np.asarray(np.diff(ends) / np.diff(self.time))
 
     def cut(self, end: float) -> ShiftRecord:

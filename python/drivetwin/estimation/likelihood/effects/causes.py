@@ -277,7 +277,7 @@ def get_advice(cause: Cause) -> str:
 def widen_by_rivals(correction: Correction, fit: LikelihoodFit, cause: Cause | None) -> Correction:
     """Widen a correction by what the values would be if a single one of the near causes acted.
 
-    The joint step divides a departure between all effects by their priors. Where several causes
+    The joint step divides a mismatch between all effects by their priors. Where several causes
     explain the log as well, one alone may be true, and then the values move as that one moves them.
     With weights w by evidence and d the moves by one cause alone less the moves of the joint step,
     the covariance grows by Σ w·d·dᵀ. Nothing changes where one cause leads.

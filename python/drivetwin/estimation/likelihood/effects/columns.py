@@ -59,9 +59,9 @@ def _build_column(at: OperatingPoint, role: str, kind: str, size: float) -> Dist
         return None
     if source == TORQUE:
         values = at.engine_torque
-        age = at.part.structure.get_value(at.point, "te_delay")
+        delay = at.part.structure.get_value(at.point, "te_delay")
         steady = at.record.steady_torque
-        rate = at.compute_rate(np.interp(at.run.time + age, steady.time, steady.values))
+        rate = at.compute_rate(np.interp(at.run.time + delay, steady.time, steady.values))
     else:
         signal = at.record.pressures[source]
         values = np.interp(at.middle, signal.time, signal.values)

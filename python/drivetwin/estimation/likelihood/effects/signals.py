@@ -79,9 +79,9 @@ def build_torque_lag(at: OperatingPoint, std: float) -> list[Disturbance]:
         return []
     torque = np.interp(raster, steady.time, steady.values)
     lagged = apply_lag(torque, STEP_S, std) if std > 0.0 else _remove_lag(torque, -std)
-    age = at.part.structure.get_value(at.point, "te_delay")
+    delay = at.part.structure.get_value(at.point, "te_delay")
     change = np.interp(raster + std, raster, lagged) - torque
-    return [Disturbance(inputs={TORQUE: np.interp(at.middle + age, raster, change)})]
+    return [Disturbance(inputs={TORQUE: np.interp(at.middle + delay, raster, change)})]
 
 
 def _remove_lag(torque: FloatArray, lag: float) -> FloatArray:

@@ -59,25 +59,25 @@ def estimate_initial_values(
 
     The median over the shifts is used, because a single shift may be uninformative or wrong.
     """
-    told = {
+    combined = {
         name: float(np.median([dict(zip(s.ids, s.values, strict=True))[name] for s in having]))
         for name in dict.fromkeys(name for shift in shifts for name in shift.ids)
         for having in ([shift for shift in shifts if name in shift.ids],)
     }
     found = {
-        "eta": told["eta"],
+        "eta": combined["eta"],
         "J_e": float(np.median([shift.momentum.get_value("J_e") for shift in shifts])),
-        "J_out": told["J_out"],
-        "J_vehicle": told["J_vehicle"],
+        "J_out": combined["J_out"],
+        "J_vehicle": combined["J_vehicle"],
         **build_load_deviations(
-            [_extrapolate_load(shift, told.get(AERO), drivelines[0].i_f) for shift in shifts]
+            [_extrapolate_load(shift, combined.get(AERO), drivelines[0].i_f) for shift in shifts]
         ),
-        "te_delay": told.get("te_delay", shifts[0].momentum.get_value("te_delay")),
+        "te_delay": combined.get("te_delay", shifts[0].momentum.get_value("te_delay")),
     }
-    if AERO in told:
-        found[AERO] = told[AERO]
-    if "k_o" in told:
-        found |= {"k_o": told["k_o"], "c_o": told["c_o"]}
+    if AERO in combined:
+        found[AERO] = combined[AERO]
+    if "k_o" in combined:
+        found |= {"k_o": combined["k_o"], "c_o": combined["c_o"]}
     else:
         found |= _estimate_typical_shaft(found, drivelines[0])
     return {k: float(v) for k, v in found.items()} | _collect_laws(shifts, drivelines)
@@ -181,7 +181,7 @@ def _estimate_inertias(
     expect are their instruments.
     """
     J_e = compute_middle(design.J_prime_range)
-    shift, age = signals.shift, MOMENTUM.delay_prior.value
+    shift, delay = signals.shift, MOMENTUM.delay_prior.value
     spans = ((shift.before, driveline.i_before), (shift.after, driveline.i_after))
     ratios, slopes, torques = [], [], []
     for span, gear in spans:
@@ -189,7 +189,7 @@ def _estimate_inertias(
         slopes.append(in_gear)
         ratios.append(np.full(in_gear.size, gear))
         torques.append(
-            np.array([_compute_mean_torque(signals, t - 0.5 * GUESS.step + age) for t in time])
+            np.array([_compute_mean_torque(signals, t - 0.5 * GUESS.step + delay) for t in time])
         )
     every = (np.concatenate(each) for each in (ratios, slopes, torques))
     ratio, slope, torque = drop_nan_rows(*every)

@@ -356,7 +356,7 @@ CANDIDATES: Mapping[str, Candidate] = {
 def collect_loads(fit: LikelihoodFit) -> tuple[float, ...]:
     """Return the load of each shift at the output shaft [N m] where they differ; else empty."""
     structures = [part.structure for part in fit.problem.parts]
-    if not any(one.departure for one in structures):
+    if not any(one.load_factors for one in structures):
         return ()
     return tuple(one.compute_load(fit.mean) for one in structures)
 

@@ -58,7 +58,7 @@ class Sensitivity:
 
     `ids` (q,) are parameter ids and `mu.<element>`, `values` (q,) their values; `errors` (e,) read
     `<role> gain`, `<role> offset` or `<role> age`, `sizes` (e,) say how large (SI but for a gain);
-    `change` is (q, e). `slips` [rad/s] by element are those at which μ is told.
+    `change` is (q, e). `slips` [rad/s] by element are those at which μ is given.
     """
 
     ids: tuple[str, ...]
