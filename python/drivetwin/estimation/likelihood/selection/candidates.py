@@ -293,7 +293,7 @@ def _propose_minima(basis: Basis) -> list[Callable[[], Refit | None]]:
         moves = found.point.values - fit.point.values
         return Refit(found, compute_evidence(fit, found, fit.chi2, ()), moves)
 
-    starts = []
+    starts: list[Callable[[], Refit | None]] = []
     for name, away in _find_lingering(fit).items():
         for side in (-away, away):
             values = fit.point.values.copy()
