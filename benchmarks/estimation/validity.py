@@ -21,11 +21,11 @@ from benchmarks.estimation.vehicles import draw_vehicle
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.effects.causes import CAUSES
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.effects.torques import REFERENCE_TORQUE
+from drivetwin.estimation.result.cause import LEAD
 from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
@@ -36,11 +36,9 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 MODE_HZ = (28.0, 110.0)
 """Range of the frequency of an input-shaft mode [Hz]."""
-EVIDENCE = 5.0
-"""Log evidence from which a cause counts as named."""
 MOVED = 2.0
 """Move of a parameter by an effect, in standard deviations, from which its cause must be found."""
-VISIBLE = CAUSES.least_evidence + float(np.log(len(EFFECTS)))
+VISIBLE = LEAD + float(np.log(len(EFFECTS)))
 """Log evidence below which no cause is named."""
 LEAST_POSSIBLE = 11
 """Values that could be identified of a vehicle without a log: those of the truth less P0."""
@@ -286,10 +284,10 @@ def summarise(logs: Sequence[StudyLog]) -> list[str]:
     lines = [_format_row(name or "none", group) for name, group in groups.items()]
     departing = [one for one in logs if one.effect]
     lines.append(_format_row("all departing", departing))
-    evident = [one for one in departing if one.evidence > EVIDENCE]
+    evident = [one for one in departing if one.evidence > LEAD]
     right = sum(one.effect in one.named for one in evident)
     obeying = groups.get("", [])
-    false = sum(one.evidence > EVIDENCE for one in obeying)
+    false = sum(one.evidence > LEAD for one in obeying)
     lines.append(f"right cause {right} of {len(evident)}, false alarms {false} of {len(obeying)}")
     moved = [one for one in departing if one.moved is not None and one.moved > MOVED]
     visible = [one for one in moved if (one.own_evidence or 0.0) > VISIBLE]
