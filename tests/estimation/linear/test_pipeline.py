@@ -70,7 +70,7 @@ def test_the_shift_alone_carries_eta_and_inertia(constant: Run) -> None:
     found = identify_shift(constant.signals(), Truth().driveline(), 12.0)
     compare(found, Truth(), 5e-4, 5e-4)
     assert "te_delay" not in found.ids
-    assert "age" in found.refusals["te_delay"]
+    assert "delay" in found.refusals["te_delay"]
 
 
 @pytest.mark.parametrize("P0", [PriorValue(8e4, 1e5), PriorValue(0.0, 1e5), PriorValue(0.0)])
