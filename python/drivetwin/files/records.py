@@ -30,14 +30,7 @@ from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.errors import ResultFileError, Where
-from drivetwin.estimation.result.estimate import (
-    OF_RATIO,
-    Estimate,
-    FloatArray,
-    FrictionCurve,
-    LoadLaw,
-    Verdict,
-)
+from drivetwin.estimation.result.estimate import OF_RATIO, Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.suggestion import (
     CardNumberKind,
     Experiment,

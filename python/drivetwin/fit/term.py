@@ -23,6 +23,7 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
 from drivetwin.estimation.likelihood.objective import OBJECTIVE
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import SignalFit
+from drivetwin.estimation.result.validation import compute_fit
 from drivetwin.fit.recording import NetworkRecord
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.simulation.dual_clutch import Accuracy, Signal

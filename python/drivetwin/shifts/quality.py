@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import filter_zero_phase
 from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
