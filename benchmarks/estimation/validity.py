@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from drivetwin.estimation.likelihood.effects.torques import REFERENCE_TORQUE
 
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch_log
 from benchmarks.estimation.rough_count import FAR, compute_kept

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drivetwin.estimation.likelihood.effects.torques import REFERENCE_TORQUE
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import (
