@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import Method, ModelStatus
 from drivetwin.report.blocks import Tone
 from drivetwin.report.model_verdict import STATUS_TONES
 from drivetwin.workbench.identifying import Outcome

@@ -13,7 +13,7 @@ from drivetwin._util.display_units import (
     get_display_unit,
 )
 from drivetwin.channels.shiftlog import Quantity
-from drivetwin.estimation.result.status import ModelStatus
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.fit import HeldOut
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity

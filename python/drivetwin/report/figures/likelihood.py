@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display, format_significant
 from drivetwin.estimation.likelihood.coloured_noise import compute_block_means
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
@@ -15,7 +16,7 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     SIZE,
     Sensitivity,
 )
-from drivetwin.estimation.result.estimate import Z95, FloatArray
+from drivetwin.estimation.result.estimate import Z95
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.figure import Figure, make_subplots, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, Phases, stack_panels

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import NM
 from drivetwin.estimation.linear.load_balance import LoadFit
 from drivetwin.estimation.linear.momentum_balance import MomentumFit
 from drivetwin.estimation.linear.ringdown import RingDown
 from drivetwin.estimation.paper.wlse import GridFit
-from drivetwin.estimation.result.estimate import FloatArray
 from drivetwin.report.figure import Figure, make_subplots
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.style import (
