@@ -185,7 +185,7 @@ def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[
     bench = Bench(exact, old.structure.driveline, dict(recorded.truth.parameters), ideal)
     sensors = {sensor.role: sensor for sensor in recorded.scenario.sensors}
     means = SPEEDS if sensors["input_speed"].window > 0.0 else ()
-    curved = {TORQUE} & fit.problem.kinds
+    curved = {TORQUE} & fit.problem.modes
     record = build_record(exact, split_spans([exact])[0]).select_modes({*means, *curved})
     part = ShiftTerm.from_sensor_noise(old.structure, record)
     start = fit.point.replace_values(_build_values(fit.point, part, bench))

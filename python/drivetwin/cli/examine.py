@@ -119,7 +119,7 @@ def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
         with show_step("looking for what departs from the friction law"):
             seen = estimate_dependences(found)
         yield Answer(
-            DEPARTURES, analysis_files.format_departures(seen), [_build_departure_table(seen)]
+            DEPARTURES, analysis_files.format_dependences(seen), [_build_dependence_table(seen)]
         )
 
 
@@ -192,7 +192,7 @@ def _build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) ->
     )
 
 
-def _build_departure_table(found: tuple[Dependence, ...]) -> TableBlock:
+def _build_dependence_table(found: tuple[Dependence, ...]) -> TableBlock:
     from drivetwin.estimation.analysis.friction_dependence import UNITS
     from drivetwin.estimation.result.estimate import Z95
 

@@ -34,12 +34,12 @@ class InputDelays:
 
         Zero if the model takes acting inputs.
         """
-        return max(0.0, self._torque_age, -self.pressure) if self.as_logged else 0.0
+        return max(0.0, self._torque_delay, -self.pressure) if self.as_logged else 0.0
 
     @property
     def torque_line(self) -> float:
         """Delay [s] of the engine torque inside the model, at least 0."""
-        return self.lag - self._torque_age if self.as_logged else 0.0
+        return self.lag - self._torque_delay if self.as_logged else 0.0
 
     @property
     def pressure_line(self) -> float:
@@ -47,7 +47,7 @@ class InputDelays:
         return self.lag + self.pressure if self.as_logged else 0.0
 
     @property
-    def _torque_age(self) -> float:
+    def _torque_delay(self) -> float:
         """Mean delay [s] of the logged engine torque."""
         return self.torque + 0.5 * self.held
 

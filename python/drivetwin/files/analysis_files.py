@@ -74,7 +74,7 @@ def format_friction(one: ShapedFriction) -> str:
     )
 
 
-def format_departures(found: tuple[Dependence, ...]) -> str:
+def format_dependences(found: tuple[Dependence, ...]) -> str:
     """`departures.json`: drag of open clutches, and μ that goes with pressure or temperature."""
     names = ("kind", "element", "value", "std", "plausible", "text")
     rows = [

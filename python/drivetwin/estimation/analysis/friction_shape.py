@@ -192,7 +192,7 @@ def _replace_laws(
 
 def _restore_inputs(part: ShiftTerm, signals: ShiftSignals, span: Span) -> ShiftRecord:
     """Restore the inputs as measured: those of a fit are the expected ones."""
-    return build_record(signals, span, part.record.fills).select_modes(part.record.kinds)
+    return build_record(signals, span, part.record.fills).select_modes(part.record.modes)
 
 
 def _build_prior(

@@ -158,7 +158,7 @@ def _fit(
             found = _search_again(signals, drivelines, loss_law, guess, priors)
             if found is None:
                 raise
-            best, notes = found, tuple(report_modes(found.problem.kinds))
+            best, notes = found, tuple(report_modes(found.problem.modes))
     with _STAGES.enter("plant", "parts of the plant"):
         admitted, warnings = admit_excluded(best, priors)
         return _SelectedFit(try_plants(best, admitted), admitted, (*notes, *warnings))

@@ -313,9 +313,9 @@ class ShiftObjective(LikelihoodObjective[ShiftTerm]):
     """Likelihood of shifts."""
 
     @property
-    def kinds(self) -> frozenset[str]:
-        """Names of the signals that are of another kind than read, as in `Record.kinds`."""
-        return frozenset[str]().union(*(part.record.kinds for part in self.parts))
+    def modes(self) -> frozenset[str]:
+        """Names of the signals that are of another mode than read, as in `Record.modes`."""
+        return frozenset[str]().union(*(part.record.modes for part in self.parts))
 
     def extend(self, effect: PlantEffect, priors: Sequence[PriorValue]) -> ShiftObjective:
         """Add an effect to the plant of all shifts, with the `priors` of its unknowns.

@@ -79,7 +79,7 @@ def predict_shifts(
     held, drivelines = [one.signals for one in shifts], [one.driveline for one in shifts]
     law = drivelines[0].loss_law
     problem, point = build_problem(held, drivelines, law, _collect_values(fit, drivelines))
-    problem = problem.select_modes(fit.problem.kinds)
+    problem = problem.select_modes(fit.problem.modes)
     unseen = _find_new_unknowns(fit, problem, point)
     before = _fit_gear_before(
         problem, point, unseen, [s.shift.before[1] - STAGED_START.clearance for s in held]

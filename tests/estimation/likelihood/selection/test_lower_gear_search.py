@@ -27,7 +27,7 @@ def test_the_search_reaches_the_minimum_from_a_rough_start() -> None:
     found = fit_from_lower_gear(posed, start, [made.signals.shift])
     assert found is not None
     known = fitted()
-    assert found.problem.kinds == known.problem.kinds
+    assert found.problem.modes == known.problem.modes
     assert found.normal.cost < known.normal.cost + 1.0
 
 

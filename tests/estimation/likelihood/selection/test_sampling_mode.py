@@ -111,10 +111,10 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
     def told(fall: float) -> float:
         """The age where every search after the first ends so much lower in Q."""
         again = {
-            one.problem.kinds: replace(one, normal=replace(one.normal, cost=one.normal.cost - fall))
+            one.problem.modes: replace(one, normal=replace(one.normal, cost=one.normal.cost - fall))
             for one in (here, there)
         }
-        monkeypatch.setattr(of_signals, "_nearby", lambda posed, *_: again.get(posed.kinds))
+        monkeypatch.setattr(of_signals, "_nearby", lambda posed, *_: again.get(posed.modes))
         return average_modes(_posed(), here)[0].mean["te_delay"]
 
     std = _age(here)[1]
@@ -175,8 +175,8 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
     likely, other = select_sampling_mode(
         posed, far, [record_bench(load_scenario("throttle_steps"), 0, ROUGH).signals.shift]
     )
-    assert likely.kinds == frozenset()
-    assert other.kinds == frozenset(SPEEDS)
+    assert likely.modes == frozenset()
+    assert other.modes == frozenset(SPEEDS)
 
 
 def test_from_far_off_the_lower_gear_tells_kinds() -> None:
@@ -190,14 +190,14 @@ def test_from_far_off_the_lower_gear_tells_kinds() -> None:
     posed, start = problem(made, off=0.1)
     assert posed.update_weighting(start).cost(start) > MULTI_START.far_chi2 * posed.size
     likely, _ = select_sampling_mode(posed, start, [made.signals.shift])
-    assert frozenset(SPEEDS) <= likely.kinds
+    assert frozenset(SPEEDS) <= likely.modes
 
 
 def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     posed, _, best = _without_torque()
-    monkeypatch.setattr(of_signals, "EITHER_KIND", np.inf)
+    monkeypatch.setattr(of_signals, "EITHER_MODE", np.inf)
     wide, doubts = widen_over_modes(posed, best)
     other = fit_local(posed.select_modes(frozenset(SPEEDS)), best.point)
     assert other is not None
@@ -205,7 +205,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
     assert far < 1.96 * _age(wide)[1]
     assert "engine speed" in doubts[0].text
-    monkeypatch.setattr(of_signals, "EITHER_KIND", -np.inf)
+    monkeypatch.setattr(of_signals, "EITHER_MODE", -np.inf)
     assert widen_over_modes(posed, best) == (best, [])
 
 
@@ -233,16 +233,16 @@ def _at_50_hertz(window: float) -> tuple[ShiftObjective, LikelihoodFit]:
 
 def test_slow_outputs_are_tried_as_the_other_kind_for_no_expansion_reaches_so_far() -> None:
     posed, known = _at_50_hertz(0.02)
-    assert known.problem.kinds == frozenset()
+    assert known.problem.modes == frozenset()
     assert abs(_age(known)[0]) > 20.0 * _age(known)[1]  # half a period of the outputs
     told = refit_slow_outputs(posed, known)
-    assert told.problem.kinds == {*SPEEDS, "output_torque"}
+    assert told.problem.modes == {*SPEEDS, "output_torque"}
     assert abs(_age(told)[0]) < 2.0 * _age(told)[1]
 
 
 def test_slow_samples_stay_samples() -> None:
     posed, known = _at_50_hertz(0.0)
-    assert known.problem.kinds == frozenset()
+    assert known.problem.modes == frozenset()
     assert refit_slow_outputs(posed, known) is known
 
 

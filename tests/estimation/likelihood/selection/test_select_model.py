@@ -106,7 +106,7 @@ def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
     made = record_bench(_sent(load_scenario("paper_steps"), rate, means), 0, Knowledge())
     fit, notes = _chosen(made)
     assert (Code.MEAN_SAMPLES in [note.code for note in notes]) == means
-    assert fit.problem.kinds == (frozenset(SPEEDS) if means else frozenset())
+    assert fit.problem.modes == (frozenset(SPEEDS) if means else frozenset())
     assert AERO not in fit.point.names
     assert fit.chi2 == pytest.approx(1.0, abs=0.05)
     truth = truth_of(made)
@@ -118,7 +118,7 @@ def test_without_an_output_torque_speeds_are_told_apart_all_the_same() -> None:
     made = record_bench(_sent(load_scenario("paper_steps"), 100.0, True), 0, Knowledge(J_out=0.1))
     nothing = MeasuredSignal(np.empty(0), np.empty(0))
     fit, _ = _chosen(replace(made, signals=replace(made.signals, output_torque=nothing)))
-    assert fit.problem.kinds == frozenset(SPEEDS)
+    assert fit.problem.modes == frozenset(SPEEDS)
     assert _deviation(fit, "te_delay", truth_of(made)["te_delay"]) < 3.5
 
 
@@ -134,7 +134,7 @@ def test_an_engine_torque_that_comes_rarely_is_taken_for_a_curve() -> None:
     scenario = replace(base, engine_torque=pedal, sensors=tuple(sensors))
     made = record_bench(scenario, 0, Knowledge())
     fit, _ = _chosen(made)
-    assert fit.problem.kinds == frozenset({TORQUE})
+    assert fit.problem.modes == frozenset({TORQUE})
     assert fit.chi2 == pytest.approx(1.0, abs=0.05)
     truth = truth_of(made)
     for name in ("eta", "J_e", "J_vehicle", "k_o", "c_o", "te_delay"):

@@ -147,7 +147,7 @@ class ShiftRecord(ComparedOutputs):
         return np.concatenate([columns[out.name][out.place] for out in self.outputs])
 
     @property
-    def kinds(self) -> frozenset[str]:
+    def modes(self) -> frozenset[str]:
         """Names of the outputs interpreted as means over their period, and `TORQUE` if the
         engine torque is a curve between its samples instead of a straight line."""
         means = frozenset(out.name for out in self.outputs if out.window > 0.0)

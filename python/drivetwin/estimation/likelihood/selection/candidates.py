@@ -284,7 +284,7 @@ def _propose_minima(basis: Basis) -> list[Callable[[], Refit | None]]:
     value. Q alone is compared: log|Σ| depends on how often noise engages the element.
     """
     fit = basis.fit
-    problem = basis.problem.select_modes(fit.problem.kinds)
+    problem = basis.problem.select_modes(fit.problem.modes)
 
     def search(start: ParameterVector) -> Refit | None:
         found = fit_local(problem, start)

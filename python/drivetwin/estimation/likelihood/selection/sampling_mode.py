@@ -4,22 +4,21 @@
 An output may be the mean over the time since the sample before, as encoders on a bus send it. That
 is half a sample late, and half a millisecond between torque and speed moves k_o and c_o by several
 standard deviations. Between its samples an engine torque may be straight or a curve
-(`compute_bend`). Which kind may fit better is told by the expansion of Q for one of them: what the
-others would show differs by a known column each. Where that hardly tells, what is told of the
-unknowns is averaged.
+(`compute_bend`). Which mode may fit better follows from the expansion of Q for one of them: that of
+the others differs by a known column each. Where it hardly decides, the unknowns are averaged.
 
-Where all outputs are of the other kind, which is nearly an age of the inputs, fits compare by their
-deviance and not by Q: with θ the unknowns, y the samples and δ the noise of the inputs u, of
+Where all outputs are of the other mode, which is nearly a delay of the inputs, fits compare by
+their deviance and not by Q: with θ the unknowns, y the samples and δ the noise of the inputs u, of
 covariance C, the likelihood is
 
     L(θ) = ∫ p(y | θ, u - δ)·p(δ) dδ,   -2·log L = Q + log|Σ| + n·log 2π,   Σ = R + G·C·Gᵀ
 
 where Q is the least over δ (Laplace's approximation; exact where the outputs are linear in δ, by
-|R + G·C·Gᵀ| = |R|·|1 + C·GᵀR⁻¹G|). G is that of the run at the minimum, so Σ hangs on the kind
+|R + G·C·Gᵀ| = |R|·|1 + C·GᵀR⁻¹G|). G is that of the run at the minimum, so Σ depends on the mode
 through the unknowns that go with it: when elements slip, and at what pressures. An age of the
 inputs moves these so far that log|Σ| differs by up to 40, mostly against the difference of Q: what
 gives pressure noise more room leaves less. It is no sure judge either: noise about P0 moves both
-terms by several. Other kinds move P0 and friction so little that Q decides between them.
+terms by several. Other modes move P0 and friction so little that Q decides between them.
 """
 
 from __future__ import annotations
@@ -51,50 +50,50 @@ COMMON_PRICE = 4.0
 """Fall of Q, or of the deviance, from which on all speeds count as means, or the engine torque as
 a curve: encoders that send means are common, at odds of e² against them."""
 RARE_PRICE = 8.0
-"""The same for means of the output torque alone, and for each speed of another kind than the rest:
+"""The same for means of the output torque alone, and for each speed of another mode than the rest:
 rare, at odds of e⁴. Half a millisecond of the torque is six standard deviations of its age."""
 TIE = 6.0
-"""Rise of the same below which the 95 % interval reaches the minimum of the other kind,
+"""Rise of the same below which the 95 % interval reaches the minimum of the other mode,
 whatever its weight: odds of 20."""
-EITHER_KIND = 20.0
-"""Rise of the deviance below which outputs that lie `_far_apart` may be of the other kind. Half
+EITHER_MODE = 20.0
+"""Rise of the deviance below which outputs that lie `_far_apart` may be of the other mode. Half
 their period is nearly an age of the engine torque; noise about P0, and how the values of
-a torque are joined, which no model has quite, have been seen to speak for the wrong kind by 10, and
+a torque are joined, which no model has quite, have been seen to speak for the wrong mode by 10, and
 Q alone by 17."""
 UNLIKELY = 0.01
-"""Weight of a kind below which it is not fitted."""
+"""Weight of a mode below which it is not fitted."""
 MATTERS = 0.5
-"""Spread of an unknown over the kinds of a signal, in its standard deviations, worth a word."""
+"""Spread of an unknown over the modes of a signal, in its standard deviations, worth a word."""
 WORSE = 1.1
-"""Q per sample, as a factor, from which on other kinds are surely no better."""
+"""Q per sample, as a factor, from which on other modes are surely no better."""
 SLOW = 4e-3
 """Period of outputs [s] from which on half of it is too far away for an expansion."""
 ROUNDS = 3
-"""Most changes of kind: far off, the expansion promises the way, not the end of it."""
+"""Most changes of mode: far off, the expansion promises the way, not the end of it."""
 
 
 def select_sampling_mode(
     problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
 ) -> tuple[ShiftObjective, ShiftObjective]:
-    """The problem, which has signals as read, with the kinds that promise least from `start`, and
-    with the speeds, or all slow outputs, of the other kind.
+    """The problem, which has signals as read, with the modes that promise least from `start`, and
+    with the speeds, or all slow outputs, of the other mode.
 
     From far off an expansion promises anything: at ten times the noise, where logs without an
-    output torque start, a mixture of kinds by a thousand of Q. From there the lower gear alone is
+    output torque start, a mixture of modes by a thousand of Q. From there the lower gear alone is
     brought onto the measurement first: in a pedal step means that are taken for samples may leave
     so much that no search with them ends at a plausible minimum. Where that fails too the signals
     are taken as read.
     """
-    kinds = _told_near(problem, start)
-    if kinds is None and (gear := fit_lower_gear_only(problem, start, shifts)) is not None:
-        kinds = _told_near(gear.problem, gear.point)
-    kinds = kinds or frozenset()
-    other = kinds ^ (_far_apart(problem) or frozenset(SPEEDS))
-    return problem.select_modes(kinds), problem.select_modes(other)
+    modes = _find_nearby_modes(problem, start)
+    if modes is None and (gear := fit_lower_gear_only(problem, start, shifts)) is not None:
+        modes = _find_nearby_modes(gear.problem, gear.point)
+    modes = modes or frozenset()
+    other = modes ^ (_far_apart(problem) or frozenset(SPEEDS))
+    return problem.select_modes(modes), problem.select_modes(other)
 
 
 def _far_apart(problem: ShiftObjective) -> frozenset[str]:
-    """The outputs of which half a period is nearly an age of the inputs and too far away for an
+    """The outputs of which half a period is nearly a delay of the inputs and too far away for an
     expansion: the speeds of a log without an output torque, and all outputs where they are slow.
 
     That moves P0 and the age of the engine torque by many standard deviations.
@@ -107,8 +106,8 @@ def _far_apart(problem: ShiftObjective) -> frozenset[str]:
     return _shown(problem) if min(periods) > SLOW else frozenset()
 
 
-def _told_near(problem: ShiftObjective, point: ParameterVector) -> frozenset[str] | None:
-    """The kinds that promise least from `point`; None where it is far from the measurement."""
+def _find_nearby_modes(problem: ShiftObjective, point: ParameterVector) -> frozenset[str] | None:
+    """The modes that promise least from `point`; None where it is far from the measurement."""
     weighted = problem.update_weighting(point)
     normal = weighted.normal(point)
     if normal is None or normal.cost > MULTI_START.far_chi2 * problem.size:
@@ -117,22 +116,22 @@ def _told_near(problem: ShiftObjective, point: ParameterVector) -> frozenset[str
 
 
 def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
-    """The fit with every signal of the likeliest kind.
+    """The fit with every signal of the likeliest mode.
 
-    `problem` has signals as read, `best` is its fit with some kinds. Without an output torque half
+    `problem` has signals as read, `best` is its fit with some modes. Without an output torque half
     a period of all speeds is an age of the engine torque, too far away for an expansion to tell
-    which it is: there the other kind of speeds is tried.
+    which it is: there the other mode of speeds is tried.
     """
 
-    tried = {best.problem.kinds}
+    tried = {best.problem.modes}
 
     def better_of(
-        one: LikelihoodFit, kinds: frozenset[str], start: ParameterVector
+        one: LikelihoodFit, modes: frozenset[str], start: ParameterVector
     ) -> LikelihoodFit:
-        if kinds in tried:
+        if modes in tried:
             return one
-        tried.add(kinds)
-        other = _nearby(problem.select_modes(kinds), one, start)
+        tried.add(modes)
+        other = _nearby(problem.select_modes(modes), one, start)
         return one if other is None or _rise(problem, one, other) >= 0.0 else other
 
     for _ in range(ROUNDS):
@@ -142,17 +141,17 @@ def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodF
             break
     if problem.parts[0].scale_known:
         return best
-    return better_of(best, best.problem.kinds ^ frozenset(SPEEDS), _start_of_other_outputs(best))
+    return better_of(best, best.problem.modes ^ frozenset(SPEEDS), _start_of_other_outputs(best))
 
 
 def refit_slow_outputs(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
     """The fit, or where the outputs of a log with an output torque are slow that with all of them
-    of the other kind, if it is likelier. `problem` has signals as read."""
+    of the other mode, if it is likelier. `problem` has signals as read."""
     outputs = _far_apart(problem)
     if not outputs or not problem.parts[0].scale_known:
         return best
-    kinds = best.problem.kinds ^ outputs
-    other = _nearby(problem.select_modes(kinds), best, _start_of_other_outputs(best))
+    modes = best.problem.modes ^ outputs
+    other = _nearby(problem.select_modes(modes), best, _start_of_other_outputs(best))
     if other is None or _rise(problem, best, other) >= 0.0:
         return best
     try:
@@ -169,22 +168,22 @@ def refit_mode_beside(
     What an effect does may look like half a sample. `problem` has signals as read.
     """
     choices = _choices(best.problem, best.point, best.normal, effects)
-    kinds = _flipped(best.problem.kinds, choices.flips[int(np.argmin(choices.left))])
-    if kinds == best.problem.kinds:
+    modes = _flipped(best.problem.modes, choices.flips[int(np.argmin(choices.left))])
+    if modes == best.problem.modes:
         return best
-    return _nearby(problem.select_modes(kinds), best, best.point) or best
+    return _nearby(problem.select_modes(modes), best, best.point) or best
 
 
 def average_modes(
     problem: ShiftObjective, best: LikelihoodFit, effects: WeightedColumns | None = None
 ) -> tuple[LikelihoodFit, list[Finding]]:
-    """The fit with mean and covariance over all kinds, weighted by their likelihood, and findings
-    on kinds that the log hardly tells.
+    """The fit with mean and covariance over all modes, weighted by their likelihood, and findings
+    on modes that the log hardly determines.
 
-    The minima of two kinds may lie six standard deviations apart and one sample in twenty thousand
+    The minima of two modes may lie six standard deviations apart and one sample in twenty thousand
     decide between them; an interval about one of them would be wrong as often as that is the wrong
     one (Burnham and Anderson 2002). `problem` has signals as read. By the expansion none gets more
-    weight than the kinds of the fit; those that would matter are fitted. With `effects` that the
+    weight than the modes of the fit; those that would matter are fitted. With `effects` that the
     log shows the expansion has them too, and nothing is fitted: a fit would lack them.
     """
     choices = _choices(best.problem, best.point, best.normal, effects)
@@ -203,20 +202,20 @@ def widen_over_modes(
     problem: ShiftObjective, best: LikelihoodFit
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with its covariance widened up to the minimum that has the outputs which lie
-    `_far_apart` of the other kind, and a finding; as it is where the deviance rises much to
+    `_far_apart` of the other mode, and a finding; as it is where the deviance rises much to
     there."""
     outputs = _far_apart(problem) & _shown(problem)
     if not outputs:
         return best, []
-    kinds, start = best.problem.kinds ^ outputs, _start_of_other_outputs(best)
+    modes, start = best.problem.modes ^ outputs, _start_of_other_outputs(best)
     try:
         other = fit_local(
-            problem.select_modes(kinds), start, WORSE * best.normal.cost / problem.size
+            problem.select_modes(modes), start, WORSE * best.normal.cost / problem.size
         )
     except BudgetExceeded:  # nobody knows: what shows the same may be as good
         far = start.values - best.point.values
     else:
-        if other is None or _rise(problem, best, other) > EITHER_KIND:
+        if other is None or _rise(problem, best, other) > EITHER_MODE:
             return best, []
         far = other.point.values - best.point.values
     names = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in outputs)
@@ -247,21 +246,21 @@ def _fitted(problem: ShiftObjective, best: LikelihoodFit, choices: _Choices) -> 
     """The choices as seen from the minimum of the first, those fitted that would matter: what an
     expansion says of a minimum far away is too rough to weigh it by.
 
-    Of its many kinks Q may end some lower by another search alone, so the first kinds are searched
+    Of its many kinks Q may end some lower by another search alone, so the first modes are searched
     again from where those went that seem as likely.
     """
     seen = choices.centre()
     left, steps = seen.left, seen.steps
     far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
     for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
-        kinds = _flipped(best.problem.kinds, choices.flips[k])
-        other = _nearby(problem.select_modes(kinds), best, best.point)
+        modes = _flipped(best.problem.modes, choices.flips[k])
+        other = _nearby(problem.select_modes(modes), best, best.point)
         if other is None:
             left[k] = np.inf
             continue
         left[k] = _rise(problem, best, other)
         steps[k] = other.point.values - best.point.values
-        first = problem.select_modes(best.problem.kinds)
+        first = problem.select_modes(best.problem.modes)
         if left[k] < TIE and (back := _nearby(first, other, other.point)):
             left[0] = min(left[0], _rise(problem, best, back))
     return seen
@@ -270,7 +269,7 @@ def _fitted(problem: ShiftObjective, best: LikelihoodFit, choices: _Choices) -> 
 def _nearby(
     problem: ShiftObjective, best: LikelihoodFit, start: ParameterVector
 ) -> LikelihoodFit | None:
-    """The minimum from `start`; None where it is surely no better than `best`, of other kinds, or
+    """The minimum from `start`; None where it is surely no better than `best`, of other modes, or
     not found with the work that is left."""
     try:
         return fit_local(problem, start, WORSE * best.normal.cost / problem.size)
@@ -279,11 +278,11 @@ def _nearby(
 
 
 def _rise(problem: ShiftObjective, one: LikelihoodFit, other: LikelihoodFit) -> float:
-    """Rise from `one` to the `other` of what kinds compare by, with their prices: the deviance
-    where all outputs are of the other kind, Q where not."""
-    kinds, others = one.problem.kinds, other.problem.kinds
-    prices = _price(problem, others) - _price(problem, kinds)
-    if _shown(problem) <= kinds ^ others:
+    """Rise from `one` to the `other` of what modes compare by, with their prices: the deviance
+    where all outputs are of the other mode, Q where not."""
+    modes, others = one.problem.modes, other.problem.modes
+    prices = _price(problem, others) - _price(problem, modes)
+    if _shown(problem) <= modes ^ others:
         return other.deviance - one.deviance + prices
     return other.normal.cost - one.normal.cost + prices
 
@@ -299,9 +298,9 @@ def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[Find
     return [report(Code.SAMPLING_UNCERTAIN, channels=", ".join(names))] if names else []
 
 
-def report_modes(kinds: frozenset[str]) -> list[Finding]:
+def report_modes(modes: frozenset[str]) -> list[Finding]:
     """Report the signals that are not as read."""
-    means = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in kinds)
+    means = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in modes)
     return [report(Code.MEAN_SAMPLES, channels=means)] if means else []
 
 
@@ -310,21 +309,21 @@ def _promising(
 ) -> frozenset[str]:
     """Names of the signals that are better taken for something else than read."""
     choices = _choices(problem, point, normal)
-    return _flipped(problem.kinds, choices.flips[int(np.argmin(choices.left))])
+    return _flipped(problem.modes, choices.flips[int(np.argmin(choices.left))])
 
 
-def _flipped(kinds: frozenset[str], flips: FloatArray) -> frozenset[str]:
-    """The kinds with those of `SIGNALS` changed whose flip (m,) is 1."""
-    return kinds ^ {name for name, flip in zip(SIGNALS, flips, strict=True) if flip}
+def _flipped(modes: frozenset[str], flips: FloatArray) -> frozenset[str]:
+    """The modes with those of `SIGNALS` changed whose flip (m,) is 1."""
+    return modes ^ {name for name, flip in zip(SIGNALS, flips, strict=True) if flip}
 
 
-def _price(problem: ShiftObjective, kinds: frozenset[str]) -> float:
+def _price(problem: ShiftObjective, modes: frozenset[str]) -> float:
     """Compute the penalty of modes other than read: twice the logarithm of the odds against
     them."""
     speeds = _shown(problem).intersection(SPEEDS)
-    means = len(kinds & speeds)
-    common = int(means > 0) + int(TORQUE in kinds)
-    rare = min(means, len(speeds) - means) + int("output_torque" in kinds)
+    means = len(modes & speeds)
+    common = int(means > 0) + int(TORQUE in modes)
+    rare = min(means, len(speeds) - means) + int("output_torque" in modes)
     return COMMON_PRICE * common + RARE_PRICE * rare
 
 
@@ -336,7 +335,7 @@ def _shown(problem: ShiftObjective) -> frozenset[str]:
 @dataclass(frozen=True, eq=False)
 class _Choices:
     """Every way to take the signals, the one at hand first: `flips` (q, m) of `SIGNALS` are 1 where
-    one is of the other kind than now, `left` (q,) is what kinds compare by with their price,
+    one is of the other mode than now, `left` (q,) is what modes compare by with their price,
     less a constant, and `steps` (q, p) is how the unknowns follow."""
 
     flips: FloatArray
@@ -370,7 +369,7 @@ def _choices(
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
     gradients = gradient + flips @ cross.T
     steps = np.array([solve_step(information, one) for one in gradients])
-    price = np.array([_price(problem, _flipped(problem.kinds, row)) for row in flips])
+    price = np.array([_price(problem, _flipped(problem.modes, row)) for row in flips])
     followed = np.sum(gradients * steps, axis=1)
     before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
     return _Choices(flips, before + followed + price, steps[:, : point.values.size])

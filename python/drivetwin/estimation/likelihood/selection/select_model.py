@@ -93,7 +93,7 @@ def select_model(
     with _STAGES.enter("search"), limit_evaluations(SELECTION.max_work) as search:
         best = fit_candidates(problem, start, shifts)
     with (
-        _STAGES.enter("slow outputs", "kinds of signals"),
+        _STAGES.enter("slow outputs", "modes of signals"),
         limit_evaluations(MAX_REFIT_WORK),
     ):
         best = refit_slow_outputs(problem, best)
@@ -110,13 +110,13 @@ def select_model(
     ):
         best = try_minima(best, problem)
     with (
-        _STAGES.enter("averaging", "kinds of signals"),
+        _STAGES.enter("averaging", "modes of signals"),
         limit_evaluations(min(MAX_REFIT_WORK, search.left)),
     ):
         best, doubts = _average_modes(problem, best, priors)
     with _STAGES.enter("other outputs"), limit_evaluations(MAX_REFIT_WORK):
         best, either = widen_over_modes(problem, best)
-    return best, (*notes, *report_modes(best.problem.kinds), *dict.fromkeys((*doubts, *either)))
+    return best, (*notes, *report_modes(best.problem.modes), *dict.fromkeys((*doubts, *either)))
 
 
 def _average_modes(
@@ -150,8 +150,8 @@ def _restrict(
     if left_out == [AERO] and wider.point[AERO] == 0.0:
         return _drop_unknown(wider, problem, AERO), problem
     try:
-        of_kinds = problem.select_modes(wider.problem.kinds)
-        return fit_multistart(of_kinds, _copy_values(start, point), shifts, thorough=False), problem
+        of_modes = problem.select_modes(wider.problem.modes)
+        return fit_multistart(of_modes, _copy_values(start, point), shifts, thorough=False), problem
     except BudgetExceeded:
         return None
 
@@ -161,7 +161,7 @@ def fit_candidates(
 ) -> LikelihoodFit:
     """Fit with every signal in its likeliest sampling mode.
 
-    Raises IdentificationError where it does not converge with the likeliest kinds.
+    Raises IdentificationError where it does not converge with the likeliest modes.
     """
     likely, other = select_sampling_mode(problem, start, shifts)
     best = _try_fit(likely, start, shifts) or fit_multistart(
@@ -170,7 +170,7 @@ def fit_candidates(
     best = refit_best_mode(problem, best)
     if best.chi2 < MULTI_START.accept_chi2:
         return best
-    second = refine(best, problem.select_modes(best.problem.kinds), start, shifts)
+    second = refine(best, problem.select_modes(best.problem.modes), start, shifts)
     return best if second is best else refit_best_mode(problem, second)
 
 
