@@ -72,9 +72,9 @@ def _list_assignments(nodes: list[ast.stmt]) -> Iterator[tuple[str, ast.expr]]:
             continue
         for target in targets:
             names = target.elts if isinstance(target, ast.Tuple) else [target]
-            values = [value] * len(names)
-            if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-                values = value.elts
+            values = value.elts if isinstance(value, ast.Tuple) and len(names) > 1 else [value]
+            if len(values) != len(names):  # a value for all, or an unpacked one
+                values = [value] * len(names)
             for name, one in zip(names, values, strict=True):
                 if isinstance(name, ast.Name):
                     yield name.id, one

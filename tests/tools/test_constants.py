@@ -8,6 +8,7 @@ from tools.constants import count_constants, find_constants
 SOURCE = """
 LIMIT = 3.0
 LEFT, RIGHT = (1, 2), "text"
+FIRST, SECOND = (*("a", "b"),)
 NAME = "a"
 RATE: float = 2 * 5
 lower = 4.0
