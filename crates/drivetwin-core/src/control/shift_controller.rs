@@ -322,12 +322,26 @@ mod tests {
         let given = ShiftController { lock_lead: 0.02, ..controller() };
         let mut state = ControllerState::new(&given);
         let at = |slip| Slips { offgoing: 60.0, oncoming: slip };
-        state.command(0.30, at(60.0));
-        state.command(0.59, at(4.0));
+        state.command(0.30, at(5.0));
+        state.command(0.31, at(4.0));
         // 100 rad/s² over 20 ms leave 1 rad/s, over the next task 0.
-        state.command(0.60, at(3.0));
+        state.command(0.32, at(3.0));
         assert!(matches!(state.phase, Phase::Inertia));
-        state.command(0.61, at(2.0));
+        state.command(0.33, at(2.0));
+        assert!(matches!(state.phase, Phase::Locking { .. }));
+    }
+
+    #[test]
+    fn the_final_ramp_begins_where_the_slip_no_longer_falls_after_the_plan() {
+        let given = controller();
+        let mut state = ControllerState::new(&given);
+        let at = |slip| Slips { offgoing: 60.0, oncoming: slip };
+        state.command(0.30, at(60.0));
+        state.command(0.50, at(60.0));
+        assert!(matches!(state.phase, Phase::Inertia));
+        state.command(0.71, at(3.0));
+        assert!(matches!(state.phase, Phase::Inertia));
+        state.command(0.72, at(3.0));
         assert!(matches!(state.phase, Phase::Locking { .. }));
     }
 
