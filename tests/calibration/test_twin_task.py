@@ -120,7 +120,7 @@ def test_a_slip_loop_has_the_actuators_of_the_twin() -> None:
         build_task(make_twin(), asked)
 
 
-@pytest.mark.parametrize("kind", list(PolicyKind))
+@pytest.mark.parametrize("kind", [one for one in PolicyKind if one is not PolicyKind.OWN])
 def test_a_start_by_name(kind: PolicyKind) -> None:
     twin = make_hydraulic_twin()
     policy = build_task(twin, replace(REQUEST, policy=kind, limits=())).policy
@@ -130,6 +130,11 @@ def test_a_start_by_name(kind: PolicyKind) -> None:
     assert {one.name: one.start for one in task.policy.parameters}.items() >= start.items()
     with pytest.raises(InputError, match="no parameter wrong"):
         build_task(twin, replace(REQUEST, policy=kind, start={"wrong": 0.1}, limits=()))
+
+
+def test_the_own_policy_needs_a_controller() -> None:
+    with pytest.raises(InputError, match="needs a controller"):
+        build_task(make_hydraulic_twin(), replace(REQUEST, policy=PolicyKind.OWN, limits=()))
 
 
 def test_a_downshift_with_power_is_refused() -> None:
