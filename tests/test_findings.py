@@ -30,7 +30,9 @@ def test_every_code_has_an_entry_and_each_entry_a_code() -> None:
 def test_every_code_is_reported_somewhere() -> None:
     package = Path(findings.__file__).parent
     sources = "".join(path.read_text(encoding="utf-8") for path in package.rglob("*.py"))
-    assert [code.name for code in Code if not re.search(rf"Code\.{code.name}\b", sources)] == []
+    sources += "".join(path.read_text(encoding="utf-8") for path in package.rglob("card_*.toml"))
+    names = [(code.name, rf"Code\.{code.name}\b|finding = \"{code.value}\"") for code in Code]
+    assert [name for name, pattern in names if not re.search(pattern, sources)] == []
 
 
 @pytest.mark.parametrize("code", Code)

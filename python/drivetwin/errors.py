@@ -13,6 +13,7 @@ PYTHON_WORDS = {
     "--engine-torque and --engine-speed": "engine_torque and engine_speed",
     "--system-pressure": "system_pressure",
     "another --policy": "another policy",
+    "give --controller FILE": "give the controller of the request",
     "(--effort)": "(CalibrationSettings.scale_effort)",
     "(--time-limit)": "(argument 'limits')",
     "(--memory-limit)": "(argument 'limits')",

@@ -120,8 +120,8 @@ def test_an_odd_unit_is_told_by_the_command(
 ) -> None:
     assert main(["fleet", "estimate", str(store.folder), "--parameter", "mu.B3"]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "mu.B3: unit T4 is 0.0" in told
-    assert "it counts in value and spread" in told
+    assert "Units beyond what chance makes. They count in shared value and spread." in told
+    assert "T4 μ (B3) 0.0455" in told
 
 
 def test_a_stray_log_is_named_with_the_reason(found: dict[str, JointEstimate]) -> None:
