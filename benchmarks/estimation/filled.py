@@ -49,7 +49,7 @@ JITTER = 0.03
 
 
 class Harm(Enum):
-    """What is done to the channels of a log before it is written."""
+    """Change of the channels of a log before it is written."""
 
     NONE = "untouched"
     FILLED = "filled"

@@ -46,7 +46,7 @@ class Interpolant(StrEnum):
 
     @property
     def has_formula(self) -> bool:
-        """Whether the values at the knots determine the polynomial."""
+        """True if the values at the knots determine the polynomial."""
         return self is not Interpolant.HERMITE
 
 
@@ -64,7 +64,7 @@ class KnotRaster:
 
     @property
     def is_linear(self) -> bool:
-        """Whether straight lines join the knots."""
+        """True if straight lines join the knots."""
         return self.interpolant is Interpolant.LINEAR
 
     def place_knots(self, time: FloatArray, share: float = 0.0, parts: int = 1) -> FloatArray:

@@ -154,7 +154,7 @@ def _build_controller(path: Path | None) -> Iterator[UserController | None]:
 
     content = load_controller_file(path)
     source = path.parent / content.source
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # Windows keeps loaded libraries
         platform = detect_platform()
         library = Path(folder) / f"{source.stem}{platform.suffix if platform else '.so'}"
         with show_step(f"compiling {source.name}"):

@@ -55,7 +55,7 @@ class ConsistencyRecord(Record):
 
 
 class LogRecord(Record):
-    """One log of a fit of several: its number as in parameter ids, and what it tells alone."""
+    """One log of a joint fit: its number as in parameter ids, and the estimates from it alone."""
 
     number: int
     file: str

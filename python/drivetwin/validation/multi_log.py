@@ -60,17 +60,17 @@ def _predict_shift(
         log = refer_to_turbine(log, card, shift)
         fills = {name: card.get_element(name).P0 for name in (shift.offgoing, shift.oncoming)}
         shift = trim_to_window(trim_to_recorded(log, shift, fills, card.i_in.value))
-        told = _predict_misfit(fit, card, log, shift, number)
-        mine, own = _select_log_estimates(found, log, number, told)
+        predicted = _predict_misfit(fit, card, log, shift, number)
+        mine, own = _select_log_estimates(found, log, number, predicted)
         mine, findings = _ensure_friction_law(mine, shift)
         twin = build_twin(mine, card)
-        start = None if told is None else (told.time, told.start)
+        start = None if predicted is None else (predicted.time, predicted.start)
         run = simulate_shift(twin, log, shift, start=start)
     except DrivetwinError as fault:
         return HeldOut(
             log.source, shift, None, findings=(report(Code.NOT_PREDICTED, why=fault.what),)
         )
-    bounds = {} if told is None else _map_signal_bounds(told.bounds, run, log, card)
+    bounds = {} if predicted is None else _map_signal_bounds(predicted.bounds, run, log, card)
     return HeldOut(log.source, shift, run, own, bounds, (*findings, *run.findings))
 
 
@@ -85,20 +85,20 @@ def _predict_misfit(
 
 
 def _select_log_estimates(
-    found: Identification, log: ShiftLog, number: int, told: ShiftPrediction | None
+    found: Identification, log: ShiftLog, number: int, predicted: ShiftPrediction | None
 ) -> tuple[Identification, dict[str, Estimate]]:
-    """Return the identification with the log-specific parameters: from the fit, else from `told`.
+    """Return the identification with the log-specific parameters, of the fit or of `predicted`.
 
-    The second value contains the estimates from `told` alone, in the order of the estimates; it is
-    empty for a fitted log. Raises IdentificationError for a log that was not fitted if the method
-    is not the likelihood method.
+    The second value contains the estimates from `predicted` alone, in the order of the estimates;
+    it is empty for a fitted log. Raises IdentificationError for a log that was not fitted if the
+    method is not the likelihood method.
     """
     several = found.evidence.several
     if number == 0:
         return found, {}
     if several is not None and number <= len(several.logs):
         return extract_log(found, several.logs[number - 1]), {}
-    if told is None:
+    if predicted is None:
         raise IdentificationError(
             "only the likelihood method estimates load and engine-torque delay of a log that was "
             "not fitted",
@@ -106,17 +106,17 @@ def _select_log_estimates(
             Where(file=log.source),
         )
     base = found if several is None else extract_log(found, several.logs[0])
-    load = None if base.load is None else replace(base.load, mean_speed=told.mean_speed)
-    own = _collect_log_specific(base, told)
+    load = None if base.load is None else replace(base.load, mean_speed=predicted.mean_speed)
+    own = _collect_log_specific(base, predicted)
     estimates = {**base.estimates, **own}
     ordered = {name: one for name, one in estimates.items() if name in own}
     return replace(base, estimates=estimates, load=load), ordered
 
 
-def _collect_log_specific(base: Identification, told: ShiftPrediction) -> dict[str, Estimate]:
+def _collect_log_specific(base: Identification, predicted: ShiftPrediction) -> dict[str, Estimate]:
     """Estimates of what the log has of its own; where η is from design also times η."""
     made: dict[str, Estimate] = {}
-    for name, (value, std) in told.own.items():
+    for name, (value, std) in predicted.own.items():
         ratio = name + OVER_ETA
         if ratio in base.estimates:
             made[ratio] = _build_estimate(ratio, value, std)

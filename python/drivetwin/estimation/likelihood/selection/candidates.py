@@ -11,11 +11,9 @@ the columns move the values or widen the intervals. Without columns, a term is d
 the log shows its absence, and a refit that is not chosen widens the covariance by the moves that it
 would cause, times its probability.
 
-Fit under the other loss law, and the choice between both.
-
-They differ only while the torque through the gears is reversed, so the minimum of the other is
-near: one expansion of Q at that of the first shows where it lies and how deep (a fit from there
-agrees within a tenth of a standard deviation).
+The other loss law is not a row: both laws differ only while the torque through the gears is
+reversed, so that its minimum is near. One expansion of Q at the minimum of the first predicts place
+and depth (a fit from there agrees within a tenth of a standard deviation).
 """
 
 from __future__ import annotations
@@ -66,8 +64,10 @@ _SEARCHES = TimedStages("minima", ("first refit", "refit"))
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Fit that candidates change. `problem` has signals as read; `evidence` is that of the columns
-    of the columns of all effects, with their `priors`."""
+    """Fit that candidates change.
+
+    `problem` has signals as read; `evidence` is that of the columns of all effects with `priors`.
+    """
 
     fit: LikelihoodFit
     problem: ShiftObjective

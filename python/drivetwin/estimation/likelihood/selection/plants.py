@@ -3,9 +3,7 @@
 
 Where an effect changes the motion much, no column at the minimum of the dual clutch describes it:
 a mode of the input side is absorbed by k_o before it shows. Such an effect is put into the plant
-(`PLANTS`) and the fit repeated.
-
-Log evidence of one model against another, and the average over models.
+(`PLANTS`) and the fit repeated. Models are compared by their log evidence, and averaged.
 
 With Q and the information F at the minima of both, and s the prior standard deviations of the
 unknowns that the wider one adds, Laplace's log evidence for it is

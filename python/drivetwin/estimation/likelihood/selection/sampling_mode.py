@@ -50,14 +50,15 @@ COMMON_PRICE = 4.0
 """Fall of Q, or of the deviance, from which on all speeds count as means, or the engine torque as
 a curve: encoders that send means are common, at odds of e² against them."""
 RARE_PRICE = 8.0
-"""The same for means of the output torque alone, and for each speed of another mode than the rest:
-rare, at odds of e⁴. Half a millisecond of the torque is six standard deviations of its age."""
+"""Fall of Q, or of the deviance, from which on the output torque alone, or one speed alone, has
+another mode than the rest: rare, at odds of e⁴. Half a millisecond of the torque is six standard
+deviations of its delay."""
 TIE = 6.0
 """Rise of the same below which the 95 % interval reaches the minimum of the other mode,
 whatever its weight: odds of 20."""
 EITHER_MODE = 20.0
 """Rise of the deviance below which outputs that lie `_far_apart` may be of the other mode. Half
-their period is nearly an age of the engine torque; noise about P0, and how the values of
+their period is nearly a delay of the engine torque; noise about P0, and how the values of
 a torque are joined, which no model has quite, have been seen to speak for the wrong mode by 10, and
 Q alone by 17."""
 UNLIKELY = 0.01
