@@ -46,7 +46,7 @@ def test_commands_take_older_files(
     assert twin.elements["B3"].gain == 0.027
     log = str(bench_files.log)
     assert main(["simulate", str(OLDER / "twin.toml"), log]) == 0
-    assert "output_torque" in capsys.readouterr().out
+    assert "output torque" in capsys.readouterr().out
     assert main(["observe", str(OLDER / "twin.toml"), log, "-o", str(tmp_path / "o.csv")]) == 0
     assert main(["export", str(OLDER / "twin.toml"), "--to", "c", "-o", str(tmp_path / "c")]) == 0
     assert main(["card", "check", str(OLDER / "vehicle.toml"), log, "--strict"]) == 0
