@@ -26,11 +26,10 @@ from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.knots import KnotPolicy, KnotProfile, join_profiles
 from drivetwin.calibration.policies.slip import build_slip_policy
-from drivetwin.calibration.scenarios import Draw, scale_units
+from drivetwin.calibration.scenarios import Draw, KnownDraws
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
-from drivetwin.simulation.driveline import Driveline
 from tests.support.upshift.scenario import build_model
 from tests.support.upshift.statement import BAR, make_problem
 
@@ -115,8 +114,4 @@ def make_slip_task(settings: CalibrationSettings, seed: int) -> Task:
 
 def make_draw(maneuver: Maneuver) -> Draw:
     """Return the draws of made units."""
-
-    def draw(random: np.random.Generator) -> Driveline:
-        return Driveline(scale_units(maneuver.model, Spread(), random))
-
-    return Draw(draw)
+    return Draw(KnownDraws(maneuver.model, Spread()))

@@ -141,14 +141,18 @@ class MadeVehicle:
         return {"engine_torque": found.engine_torque, "pressures": found.pressures}
 
 
-def make_vehicle(seed: int, *, whole: bool = True) -> MadeVehicle:
-    """Make the vehicle of `seed`, its log and the twin; without `whole` it has no effect."""
+def make_vehicle(seed: int, *, whole: bool = True, parts: bool = False) -> MadeVehicle:
+    """Make the vehicle of `seed`, its log and the twin; without `whole` it has no effect.
+
+    The twin has parts beside the dual clutch only with `parts`.
+    """
     drawn = draw_vehicle(seed)
     scenario = add_hydraulics(drawn.scenario, np.random.default_rng([seed, 41]))
     effect = EFFECTS[seed % len(EFFECTS)]
     effects = {effect: draw_size(seed, effect, 1.0)} if whole else {}
     recorded = misread(run(scenario, seed, effects=effects), seed)
     twin = _identify(replace(drawn, card=add_tolerances(drawn.card, scenario)), recorded)
+    twin = twin if parts else twin.drop_part()
     lag = float(np.random.default_rng([seed, 42]).uniform(0.03, 0.07))
     return MadeVehicle(seed, scenario, effects, recorded, lag, twin)
 
@@ -256,11 +260,11 @@ def add_hydraulics(scenario: Scenario, random: np.random.Generator) -> Scenario:
 
 
 def _identify(vehicle: Vehicle, recorded: DynoRun) -> Twin:
-    """Identify the log of a vehicle as it is written and read; the twin has no part beside."""
+    """Identify the log of a vehicle as it is written and read."""
     with tempfile.TemporaryDirectory() as folder:
         log_file, card_file = Path(folder) / "log.csv", Path(folder) / "card.toml"
         write_log(log_file, convert_channels(recorded))
         card_file.write_text(vehicle.card, encoding="utf-8")
         card = load_card(card_file)
         log = read_log(log_file, card)
-        return build_twin(identify(log, card, detect_shifts(log, card)), card).drop_part()
+        return build_twin(identify(log, card, detect_shifts(log, card)), card)

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import ActuatorModel
@@ -20,15 +18,14 @@ from drivetwin.calibration.policy import Space
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import (
     Draw,
+    KnownDraws,
     Purpose,
     Scenarios,
     draw_scenarios,
-    scale_units,
 )
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
-from drivetwin.simulation.driveline import Driveline
 from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.simulation.shift_control import ControlledUnit
 from tests.support.upshift.scenario import build_model
@@ -53,6 +50,8 @@ QUICK = CalibrationSettings(
     repairs=1,
     repair_iterations=1,
     certificate_draws=60,
+    promise_types=5,
+    promise_units=12,
     neighbour_draws=6,
     neighbour_iterations=1,
     neighbour_fresh_draws=20,
@@ -76,12 +75,7 @@ def make_downshift() -> Maneuver:
 
 def make_draw(maneuver: Maneuver, spread: Spread | None = None) -> Draw:
     """Made units around the driveline of a shift."""
-    given = spread or Spread()
-
-    def draw(random: np.random.Generator) -> Driveline:
-        return Driveline(scale_units(maneuver.model, given, random))
-
-    return Draw(draw)
+    return Draw(KnownDraws(maneuver.model, spread or Spread()))
 
 
 def make_draws(maneuver: Maneuver, count: int, seed: int = 1) -> Scenarios:

@@ -82,7 +82,7 @@ def test_impossible_draws_are_not_run() -> None:
     assert not is_possible(replace(shift.model, J_out=-1.0))
     impossible = Driveline(replace(shift.model, k_o=-1.0))
     with pytest.raises(InputError, match="0 of 100 drawn drivelines"):
-        draw_scenarios(shift, Draw(lambda _: impossible), 5, 1, Purpose.SEARCH)
+        draw_scenarios(shift, Draw(lambda _: lambda _: impossible), 5, 1, Purpose.SEARCH)
 
 
 @pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])

@@ -23,7 +23,14 @@ from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
 from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.polish import Run, polish
 from drivetwin.calibration.profiles import Control, Profiles, compute_nominal_profiles
-from drivetwin.calibration.scenarios import Draw, Purpose, Scenarios, draw_scenarios
+from drivetwin.calibration.promise import compute_promise
+from drivetwin.calibration.scenarios import (
+    Draw,
+    Purpose,
+    Scenarios,
+    draw_scenarios,
+    draw_types,
+)
 from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
@@ -93,6 +100,7 @@ def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
     with _STAGES.enter("certificate", "certifying on fresh draws"):
         fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)
         before, after = (assess(task, plant, one, fresh) for one in (space.start, best))
+        after = add_promise(task, plant, after)
     return Calibration(task, before, after, fresh, plant.count.runs)
 
 
@@ -126,6 +134,17 @@ def assess(task: Task, plant: Plant, coordinates: FloatArray, scenarios: Scenari
     certificate = certify(outcome, task.limits, task.settings.confidence)
     profiles = compute_nominal_profiles(plant.maneuver, control)
     return Assessment(space.to_values(coordinates), control, profiles, outcome, certificate)
+
+
+def add_promise(task: Task, plant: Plant, found: Assessment) -> Assessment:
+    """Return the assessment with the promise over vehicle types that the twin may stand for."""
+    settings = task.settings
+    types = settings.promise_types
+    drawn = draw_types(task.maneuver, task.draw, types, settings.promise_units, task.seed)
+    outcome = plant.evaluate(found.control, drawn)
+    promise = compute_promise(outcome, drawn, types, settings.promise_confidence)
+    certificate = certify(found.outcome, task.limits, settings.confidence, promise)
+    return replace(found, certificate=certificate)
 
 
 def draw_for(task: Task, count: int, purpose: Purpose) -> Scenarios:

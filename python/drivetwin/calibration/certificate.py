@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.stats import beta, binom, norm
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.promise import Promise
 
 _BINDING = 0.02
 """Relative distance from a limit below which it binds."""
@@ -24,7 +25,8 @@ class Quantiles:
     """Statistics of one metric over the draws, SI.
 
     `mean_upper`, `upper_95` and `upper_99` hold with the confidence of the certificate; None where
-    there are too few draws. `worst` is the largest value.
+    there are too few draws. `worst` is the largest value. `promised` is the quantile, over vehicle
+    types that the twin may stand for, of the 95 % value over units; None where no types were drawn.
     """
 
     median: float
@@ -35,6 +37,7 @@ class Quantiles:
     share_99: float
     upper_99: float | None
     worst: float
+    promised: float | None = None
 
 
 class LimitState(StrEnum):
@@ -83,6 +86,7 @@ class Certificate:
 
     `worst_share` of all units stays below the worst value drawn, with that confidence. The upper
     bounds of the shares of units that do not lock, or lock twice, are of Clopper and Pearson.
+    `shares` are those of the variance of peak jerk that go with each uncertainty.
     """
 
     draws: int
@@ -94,13 +98,21 @@ class Certificate:
     unlocked_upper: float
     relocked: int
     relocked_upper: float
+    shares: Mapping[str, float] = field(default_factory=dict)
 
 
-def certify(outcome: Outcome, limits: Sequence[Limit], confidence: float) -> Certificate:
-    """Compute the certificate of an outcome over fresh draws."""
+def certify(
+    outcome: Outcome,
+    limits: Sequence[Limit],
+    confidence: float,
+    promise: Promise | None = None,
+) -> Certificate:
+    """Compute the certificate of an outcome over fresh draws, with the `promise` of its types."""
     draws = outcome.unlocked.size
+    promised = {} if promise is None else promise.levels
     quantiles = {
-        name: compute_quantiles(values, confidence) for name, values in outcome.values.items()
+        name: replace(compute_quantiles(values, confidence), promised=promised.get(name))
+        for name, values in outcome.values.items()
     }
     return Certificate(
         draws=draws,
@@ -112,6 +124,7 @@ def certify(outcome: Outcome, limits: Sequence[Limit], confidence: float) -> Cer
         unlocked_upper=compute_share_bound(outcome.unlocked, confidence),
         relocked=int(outcome.relocked.sum()),
         relocked_upper=compute_share_bound(outcome.relocked, confidence),
+        shares={} if promise is None else promise.shares,
     )
 
 

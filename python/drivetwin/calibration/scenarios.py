@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.units import DrawUnit
+from drivetwin.calibration.units import DrawActuators
 from drivetwin.errors import InputError
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift
@@ -34,6 +35,9 @@ _DESIGN = (".ratio", ".drum_inertia")
 """Endings of numbers that all units share with the nominal driveline."""
 
 
+_T = TypeVar("_T")
+
+
 class Purpose(IntEnum):
     """Use of a set of draws; each has a stream of random numbers of its own."""
 
@@ -42,10 +46,13 @@ class Purpose(IntEnum):
     TAIL = 3
     CERTIFICATE = 4
     CHECK = 5
+    PROMISE = 6
 
 
-DrawDriveline = Callable[[np.random.Generator], Driveline | None]
-"""Draws a driveline; None where the draw is impossible."""
+MakeDriveline = Callable[[np.random.Generator], Driveline]
+"""Makes a unit of a vehicle type."""
+DrawDriveline = Callable[[np.random.Generator], MakeDriveline | None]
+"""Draws a vehicle type that the twin may stand for; None where the draw is impossible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,38 +80,87 @@ class Scenarios:
 
 @dataclass(frozen=True)
 class Draw:
-    """Draws of the driveline, and of its actuators where these are simulated."""
+    """Draws of the driveline, and of its actuators where these are simulated.
+
+    Both have two stages: a type within the uncertainty of the twin, then a made unit of it.
+    """
 
     driveline: DrawDriveline
-    unit: DrawUnit | None = None
+    actuators: DrawActuators | None = None
 
 
 def draw_scenarios(
     maneuver: Maneuver, draw: Draw, count: int, seed: int, purpose: Purpose
 ) -> Scenarios:
-    """Draw `count` drivelines with steady starts. Actuators have random numbers of their own.
+    """Draw `count` units, each of a type of its own, with steady starts.
 
-    Raises InputError where most draws are impossible (an inertia below zero).
+    Actuators have random numbers of their own. Raises InputError where most draws are impossible
+    (an inertia below zero).
     """
     random = np.random.default_rng([seed, int(purpose)])
+
+    def make() -> Driveline | None:
+        unit = draw.driveline(random)
+        return None if unit is None else _keep_possible(unit(random))
+
+    drawn = collect_scenarios(maneuver, _repeat(make, count))
+    if draw.actuators is None:
+        return drawn
+    own = np.random.default_rng([seed, int(purpose), 1])
+    return replace(drawn, units=[draw.actuators(own)(own) for _ in range(count)])
+
+
+def draw_types(maneuver: Maneuver, draw: Draw, types: int, units: int, seed: int) -> Scenarios:
+    """Draw `types` vehicle types and `units` made units of each, those of a type in sequence.
+
+    The units of all types have the same random numbers: differences between types are then those
+    of the types. Raises InputError as `draw_scenarios` does.
+    """
+    random = np.random.default_rng([seed, int(Purpose.PROMISE)])
+    own = np.random.default_rng([seed, int(Purpose.PROMISE), 1])
     drivelines: list[Driveline] = []
+    made: list[ControlledUnit] = []
+    for _ in range(types):
+        drivelines += _repeat(lambda: _make_units(draw, random, units, seed), 1)[0]
+        if draw.actuators is not None:
+            unit = draw.actuators(own)
+            same = np.random.default_rng([seed, int(Purpose.PROMISE), 3])
+            made += [unit(same) for _ in range(units)]
+    return replace(collect_scenarios(maneuver, drivelines), units=made)
+
+
+def _make_units(
+    draw: Draw, random: np.random.Generator, count: int, seed: int
+) -> list[Driveline] | None:
+    """Draw a type and `count` units of it; None where one of them is impossible."""
+    unit = draw.driveline(random)
+    if unit is None:
+        return None
+    same = np.random.default_rng([seed, int(Purpose.PROMISE), 2])
+    made = [_keep_possible(unit(same)) for _ in range(count)]
+    return [one for one in made if one is not None] if None not in made else None
+
+
+def _repeat(make: Callable[[], _T | None], count: int) -> list[_T]:
+    """Return `count` possible draws. Raises InputError where most draws are impossible."""
+    found: list[_T] = []
     for _ in range(_TRIES * count):
-        if len(drivelines) == count:
+        if len(found) == count:
             break
-        one = draw.driveline(random)
-        if one is not None and is_possible(one.model):
-            drivelines.append(one)
-    if len(drivelines) < count:
+        one = make()
+        if one is not None:
+            found.append(one)
+    if len(found) < count:
         raise InputError(
-            f"{len(drivelines)} of {_TRIES * count} drawn drivelines are possible",
+            f"{len(found)} of {_TRIES * count} drawn drivelines are possible",
             "identify from more logs, or fix weak parameters on the vehicle card: the intervals "
             "of the twin reach impossible values",
         )
-    drawn = collect_scenarios(maneuver, drivelines)
-    if draw.unit is None:
-        return drawn
-    own = np.random.default_rng([seed, int(purpose), 1])
-    return replace(drawn, units=[draw.unit(own) for _ in range(count)])
+    return found
+
+
+def _keep_possible(one: Driveline) -> Driveline | None:
+    return one if is_possible(one.model) else None
 
 
 def collect_scenarios(maneuver: Maneuver, drivelines: Sequence[Driveline]) -> Scenarios:
@@ -176,6 +232,18 @@ def scale_units(model: DualClutch, spread: Spread, random: np.random.Generator) 
     )
 
 
+@dataclass(frozen=True)
+class KnownDraws:
+    """Draws of made units around a driveline that is known."""
+
+    model: DualClutch
+    spread: Spread
+
+    def __call__(self, _: np.random.Generator) -> MakeDriveline:
+        """Return the units of the driveline."""
+        return lambda random: Driveline(scale_units(self.model, self.spread, random))
+
+
 @dataclass(frozen=True, eq=False)
 class TwinDraws:
     """Draws of a twin: parameters and friction laws by their joint covariance, and made units.
@@ -189,15 +257,19 @@ class TwinDraws:
     shift: Shift
     spread: Spread
 
-    def __call__(self, random: np.random.Generator) -> Driveline | None:
-        """Draw a driveline; None where it is impossible."""
+    def __call__(self, random: np.random.Generator) -> MakeDriveline | None:
+        """Draw a type; None where it is impossible."""
         known = self._known
         values = known.draw(random, self._directions)
         model = known.draw_model(values, random)
         if model is None:
             return None
-        unit = scale_units(model, self.spread, random)
-        return Driveline(unit, self.twin.build_parts(unit, known.to_named(values)))
+
+        def make(random: np.random.Generator) -> Driveline:
+            unit = scale_units(model, self.spread, random)
+            return Driveline(unit, self.twin.build_parts(unit, known.to_named(values)))
+
+        return make
 
     @cached_property
     def _known(self) -> ModelDistribution:

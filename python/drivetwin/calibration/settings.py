@@ -39,6 +39,12 @@ class CalibrationSettings:
     """Factor on the weight of the excess from one of these polishes to the next."""
     certificate_draws: int = 2000
     """Fresh scenarios of the certificate."""
+    promise_types: int = 60
+    """Vehicle types within the uncertainty of the twin, for the promise."""
+    promise_units: int = 150
+    """Made units of each of these types."""
+    promise_confidence: float = 0.9
+    """Share of these types for which the promise holds."""
     search_share: float = 0.9
     """Quantile beyond which peak jerk is averaged in search and polish."""
     tail_share: float = 0.98

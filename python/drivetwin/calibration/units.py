@@ -14,8 +14,10 @@ from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.calibration.spread import Spread
 from drivetwin.simulation.shift_control import ControlledUnit
 
-DrawUnit = Callable[[np.random.Generator], ControlledUnit]
-"""Draws the actuators of a made unit."""
+MakeActuators = Callable[[np.random.Generator], ControlledUnit]
+"""Makes the actuators of a unit."""
+DrawActuators = Callable[[np.random.Generator], MakeActuators]
+"""Draws a type of actuators that the identified ones may be."""
 
 _DEAD_TIMES = (0.25, 2.0)
 """Range of drawn dead times, over the nominal one."""
@@ -38,14 +40,14 @@ class UnitDraws:
         """Nominal unit."""
         return ControlledUnit(self.offgoing.model, self.oncoming.model, self.engine_lag)
 
-    def __call__(self, random: np.random.Generator) -> ControlledUnit:
-        """Draw a unit."""
+    def __call__(self, random: np.random.Generator) -> MakeActuators:
+        """Draw a type within the identified covariance."""
         identified = ControlledUnit(
             _draw_actuator(self.offgoing, random),
             _draw_actuator(self.oncoming, random),
             self.engine_lag,
         )
-        return scale_unit(identified, self.spread, random)
+        return lambda random: scale_unit(identified, self.spread, random)
 
 
 def scale_unit(unit: ControlledUnit, spread: Spread, random: np.random.Generator) -> ControlledUnit:

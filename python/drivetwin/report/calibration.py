@@ -13,6 +13,7 @@ from drivetwin.calibration.learn import Correction
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import MapPoint, OperatingMap
 from drivetwin.calibration.profiles import ClosedLoop
+from drivetwin.calibration.promise import TYPES, UNITS
 from drivetwin.findings import Finding
 from drivetwin.report.blocks import (
     Block,
@@ -88,7 +89,7 @@ def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Sec
             "certificate",
             "Certificate",
             _describe_confidence(found),
-            [_build_statistics(found), _build_events(found)],
+            [_build_statistics(found), _build_events(found), _build_shares(found)],
         ),
         Section(
             "distributions",
@@ -109,7 +110,10 @@ def _build_tiles(found: Calibration) -> TilesBlock:
     before, after = found.before.certificate, found.after.certificate
     old = before.quantiles[Metric.PEAK_JERK].share_95
     new = after.quantiles[Metric.PEAK_JERK].share_95
+    promised = after.quantiles[Metric.PEAK_JERK].promised
     tiles = [
+        Tile("promised peak jerk", "–" if promised is None else f"{promised:.1f} m/s³",
+             note="for 95 % of the units"),
         Tile("95 % peak jerk", f"{new:.1f} m/s³", Tone.GOOD if new < old else Tone.DOUBTFUL,
              f"before {old:.1f} m/s³"),
         Tile("worst of the draws", f"{after.quantiles[Metric.PEAK_JERK].worst:.1f} m/s³",
@@ -133,6 +137,7 @@ def build_calibration_blocks(
     tables = [one for section in around for one in section.blocks]
     return [
         *(_build_limits(found), _build_statistics(found), _build_events(found)),
+        _build_shares(found),
         *tables,
         *build_findings_section(findings).blocks,
     ]
@@ -177,8 +182,13 @@ def _describe_confidence(found: Calibration) -> str:
         f"Upper bounds by order statistics of {one.draws} draws hold with "
         f"{100.0 * one.confidence:.0f} % confidence; so does: {100.0 * one.worst_share:.2f} % of "
         "all units stay below the worst value drawn. Only the stated spread and the identified "
-        "covariance are drawn: other temperatures and wear are not."
+        "covariance are drawn: other temperatures and wear are not. The promised value is kept by "
+        f"95 % of the units of {_describe_types(found)} vehicle types that the log leaves possible."
     )
+
+
+def _describe_types(found: Calibration) -> str:
+    return f"{100.0 * found.task.settings.promise_confidence:.0f} % of the"
 
 
 def _build_statistics(found: Calibration) -> TableBlock:
@@ -189,7 +199,7 @@ def _build_statistics(found: Calibration) -> TableBlock:
             q = one.certificate.quantiles[metric]
             values = (
                 *(q.median, q.mean, q.share_95, q.upper_95),
-                *(q.share_99, q.upper_99, q.worst),
+                *(q.share_99, q.upper_99, q.worst, q.promised),
             )
             scaled = (None if v is None else f"{v * display.factor:.4g}" for v in values)
             label = f"{spec.label} [{display.label}]" if part == "before" else ""
@@ -199,7 +209,7 @@ def _build_statistics(found: Calibration) -> TableBlock:
         *(make_number(name, secondary=True) for name in ("median", "mean")),
         *(("95 %", "s"), ("upper", "s"), ("99 %", "s")),
         make_number("upper", secondary=True),
-        ("worst", "s"),
+        *(("worst", "s"), ("promised", "s")),
     )
     return make_table("Metrics over the fresh draws", columns, rows)
 
@@ -214,6 +224,24 @@ def _build_events(found: Calibration) -> TableBlock:
             rows.append((label, part, count, f"{100.0 * bound:.2f} %"))
     columns = ("event", "", ("draws", "d"), ("upper bound of share", "s"))
     return make_table("Events of the on-coming element", columns, rows)
+
+
+def _build_shares(found: Calibration) -> TableBlock:
+    """Shares of the variance of peak jerk, largest first within stages and within elements."""
+    shares = found.after.certificate.shares
+    stages = {name: one for name, one in shares.items() if name in (TYPES, UNITS)}
+    parts = {name: one for name, one in shares.items() if name not in stages}
+    rows = [
+        (name, 100.0 * one)
+        for group in (stages, parts)
+        for name, one in sorted(group.items(), key=lambda item: -item[1])
+    ]
+    return make_table(
+        "Variance of peak jerk that goes with an uncertainty: the log's range of vehicle types "
+        "against the spread of made units, then each element alone",
+        ("uncertainty", ("share [%]", ".0f")),
+        rows,
+    )
 
 
 def _build_values(found: Calibration) -> TableBlock:

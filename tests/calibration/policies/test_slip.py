@@ -74,7 +74,7 @@ def test_drawn_units_have_the_stated_spread_and_covariance() -> None:
     one = replace(FILLING, covariance=covariance)
     draws = UnitDraws(one, one, 0.05, Spread(kiss_pressure=0.0))
     random = np.random.default_rng(5)
-    units = [draws(random) for _ in range(3000)]
+    units = [draws(random)(random) for _ in range(3000)]
     dead = np.array([each.oncoming.dead_time for each in units])
     kiss = np.array([each.oncoming.kiss_pressure for each in units])
     assert dead.std() == pytest.approx(5e-3, rel=0.06)
