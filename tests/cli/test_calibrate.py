@@ -148,7 +148,8 @@ def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> 
     exact = replace(make_twin(), covariance_ids=(), covariance=None, friction=friction)
     twin = replace(exact, parameters=add_part(make_twin(), PARTS[part]).parameters)
     save_twin(source, twin)
-    spread = "gain = 0.0\nengine_torque = 0.0\ncontact_pressure_Pa = 0.0\n"
+    names = ("gain", "engine_torque", "contact_pressure_Pa", "oil_temperature_K")
+    spread = "".join(f"{name} = 0.0\n" for name in names)
     limits.write_text(f"[limits]\nshift_time_s = 1.4\n[spread]\n{spread}")
     given = ["--shift", "2-3", "--limits", str(limits), "-o", str(out)]
     assert main(["calibrate", str(source), *given, *SHORT]) == 0

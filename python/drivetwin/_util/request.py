@@ -27,10 +27,18 @@ class Unit(NamedTuple):
     numerator: float = 1.0
     """SI value of `denominator` units."""
     denominator: float = 1.0
+    offset: float = 0.0
+    """SI value of the zero of the unit."""
+
+    @property
+    def is_si(self) -> bool:
+        """True if numbers in this unit are those in SI."""
+        return self.numerator == self.denominator and self.offset == 0.0
 
 
 _BARE = Unit("")
 RPM, BAR, NM = Unit("rpm", math.pi, 30.0), Unit("bar", 1e5), Unit("Nm")
+CELSIUS = Unit("°C", offset=273.15)
 SECOND, METRE, MEBIBYTE = Unit("s"), Unit("m"), Unit("MiB", 2.0**20)
 
 
@@ -73,15 +81,15 @@ class Argument:
 
     def to_display(self, value: Any) -> Any:
         """Convert a number from SI; return other values unchanged."""
-        if self.unit.numerator == 1.0 or value is None:
+        if self.unit.is_si or value is None:
             return value
-        return type(value)(value * self.unit.denominator / self.unit.numerator)
+        return type(value)((value - self.unit.offset) * self.unit.denominator / self.unit.numerator)
 
     def to_si(self, value: Any) -> Any:
         """Convert a number to SI; return other values unchanged."""
-        if self.unit.numerator == 1.0 or value is None:
+        if self.unit.is_si or value is None:
             return value
-        return type(value)(value * self.unit.numerator / self.unit.denominator)
+        return type(value)(value * self.unit.numerator / self.unit.denominator + self.unit.offset)
 
     def check(self, name: str, value: Any) -> None:
         """Raise InputError for a number outside the limits; `value` in SI."""

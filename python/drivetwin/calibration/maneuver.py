@@ -29,10 +29,14 @@ from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """State at the request: engine torque [N m] and engine speed [rad/s]."""
+    """State at the request: engine torque [N m], engine speed [rad/s], oil temperature [K].
+
+    An oil temperature of None is that of the twin's log.
+    """
 
     engine_torque: float
     engine_speed: float
+    oil_temperature: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Calibrations over a grid of engine torque and engine speed, each started from a neighbour.
+"""Calibrations over a grid of operating points, each started from a neighbour.
 
 The grid point in the middle is searched; all others are polished from the nearest one that is
 finished. Policies have bounds in proportion to what the shift needs, so that equal coordinates
 between the bounds are a scaled calibration. Neighbours descend from one solution; between grid
-points values are linear in torque and speed, as a controller interpolates them.
+points values are linear in torque, speed and oil temperature, as a controller interpolates them.
 """
 
 from __future__ import annotations
@@ -40,49 +40,55 @@ from drivetwin.errors import InputError
 
 MakeTask = Callable[[OperatingPoint], Task]
 """Problem at an operating point."""
-Place = tuple[int, int]
-"""Indices of torque and speed in a grid."""
+Place = tuple[int, ...]
+"""Indices of torque and speed in a grid, and of the oil temperature if it has an axis of it."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Engine torques [N m] and engine speeds [rad/s], each increasing, at least two.
+    """Engine torques [N m], engine speeds [rad/s] and oil temperatures [K], each increasing.
 
+    Each axis has at least two; without oil temperatures all points are at that of the twin's log.
     Raises InputError for others.
     """
 
     torques: tuple[float, ...]
     speeds: tuple[float, ...]
+    oil_temperatures: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, values in (("torques", self.torques), ("speeds", self.speeds)):
+        for name, values in zip(("torques", "speeds", "oil temperatures"), self.axes, strict=False):
             if len(values) < 2 or any(b <= a for a, b in pairwise(values)):
                 raise InputError(
                     f"the {name} of the map are {values}", "give at least two that increase"
                 )
 
     @property
+    def axes(self) -> list[tuple[float, ...]]:
+        """Axes in the order of a place."""
+        oil = [self.oil_temperatures] if self.oil_temperatures else []
+        return [self.torques, self.speeds, *oil]
+
+    @property
     def start(self) -> Place:
         """Point that is searched first, in the middle."""
-        return len(self.torques) // 2, len(self.speeds) // 2
+        return tuple(len(axis) // 2 for axis in self.axes)
 
     @property
     def places(self) -> list[Place]:
         """All points, those near the start first."""
-        places = product(range(len(self.torques)), range(len(self.speeds)))
+        places = product(*(range(len(axis)) for axis in self.axes))
         return sorted(places, key=lambda one: _measure_distance(one, self.start))
 
     def get_point(self, place: Place) -> OperatingPoint:
         """Return the operating point of a place."""
-        return OperatingPoint(self.torques[place[0]], self.speeds[place[1]])
+        return OperatingPoint(*(axis[k] for axis, k in zip(self.axes, place, strict=True)))
 
     @property
     def centres(self) -> list[OperatingPoint]:
         """Operating points in the middle of the cells."""
-        return [
-            OperatingPoint(0.5 * sum(torque), 0.5 * sum(speed))
-            for torque, speed in product(pairwise(self.torques), pairwise(self.speeds))
-        ]
+        cells = product(*(pairwise(axis) for axis in self.axes))
+        return [OperatingPoint(*(0.5 * sum(ends) for ends in cell)) for cell in cells]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +121,7 @@ class OperatingMap:
     runs: int
 
     def interpolate(self, point: OperatingPoint) -> FloatArray:
-        """Values (p,) at an operating point, linear in torque and speed, within the grid.
+        """Values (p,) at an operating point, linear along each axis, within the grid.
 
         Raises InputError outside it.
         """
@@ -160,7 +166,7 @@ def _polish(task: Task, plant: Plant, start: FloatArray) -> FloatArray:
 
 
 def _measure_distance(one: Place, other: Place) -> int:
-    return abs(one[0] - other[0]) + abs(one[1] - other[1])
+    return sum(abs(first - second) for first, second in zip(one, other, strict=True))
 
 
 def _assess(task: Task, values: FloatArray) -> MapPoint:
@@ -171,18 +177,25 @@ def _assess(task: Task, values: FloatArray) -> MapPoint:
 
 
 def _interpolate(grid: Grid, points: Mapping[Place, MapPoint], point: OperatingPoint) -> FloatArray:
-    axes = np.array(grid.torques), np.array(grid.speeds)
-    table = np.array(
-        [
-            [points[i, j].found.values for j in range(len(grid.speeds))]
-            for i in range(len(grid.torques))
-        ]
-    )
-    at = point.engine_torque, point.engine_speed
-    if not all(axis[0] <= one <= axis[-1] for axis, one in zip(axes, at, strict=True)):
+    axes = [np.array(axis) for axis in grid.axes]
+    values = [points[place].found.values for place in sorted(points)]
+    table = np.reshape(values, (*(axis.size for axis in axes), -1))
+    oil = point.oil_temperature
+    at = [point.engine_torque, point.engine_speed, *([] if oil is None else [oil])]
+    if len(at) != len(axes):
         raise InputError(
-            f"an engine torque of {at[0]:g} N·m at {at[1]:g} rad/s is outside the map",
-            f"take {axes[0][0]:g} to {axes[0][-1]:g} N·m and {axes[1][0]:g} to {axes[1][-1]:g} "
-            "rad/s",
+            "the operating point has an oil temperature and the map has none, or the reverse",
+            "state it exactly where the map has an axis of it",
+        )
+    if not all(axis[0] <= one <= axis[-1] for axis, one in zip(axes, at, strict=True)):
+        ends = " and ".join(
+            f"{axis[0]:g} to {axis[-1]:g} {unit}"
+            for axis, unit in zip(axes, ("N·m", "rad/s", "K"), strict=False)
+        )
+        raise InputError(
+            f"an engine torque of {at[0]:g} N·m at {at[1]:g} rad/s"
+            + (f" and {oil:g} K" if oil is not None else "")
+            + " is outside the map",
+            f"take {ends}",
         )
     return np.asarray(RegularGridInterpolator(axes, table)(np.array([at]))[0], dtype=np.float64)

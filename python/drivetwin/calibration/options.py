@@ -3,20 +3,24 @@
 
 from __future__ import annotations
 
-from drivetwin._util.request import BAR, METRE, NM, RPM, SECOND, Request, option
+from drivetwin._util.request import BAR, CELSIUS, METRE, NM, RPM, SECOND, Request, option
 from drivetwin.calibration.policies.kind import PolicyKind
 
 
 class CalibrationOptions(Request):
     """Operating point (None: from the twin), policy, hardware and seed of a calibration.
 
-    `engine_torque` [N m] and `engine_speed` [rad/s] are those at the shift request, `task` and
-    `engine_lag` [s] those of a closed slip loop. `system_pressure` [Pa] is by default the largest
-    that the twin's log has; `wheel_radius` [m].
+    `engine_torque` [N m] and `engine_speed` [rad/s] are those at the shift request,
+    `oil_temperature` [K] is by default that of the twin's log. `task` and `engine_lag` [s] are
+    those of a closed slip loop. `system_pressure` [Pa] is by default the largest that the twin's
+    log has; `wheel_radius` [m].
     """
 
     engine_torque: float | None = option("Engine torque at the shift request.", unit=NM)
     engine_speed: float | None = option("Engine speed at the shift request.", unit=RPM)
+    oil_temperature: float | None = option(
+        "Oil temperature of the shift.", unit=CELSIUS, minimum=-40.0, maximum=180.0
+    )
     system_pressure: float | None = option("Pressure of a held element.", unit=BAR)
     wheel_radius: float = option("Dynamic tyre radius.", unit=METRE, minimum=0.05, default=0.5)
     policy: PolicyKind = option(

@@ -75,9 +75,8 @@ def _compute_shares(values: FloatArray, scenarios: Scenarios, types: int) -> dic
     by_type = values.reshape(types, -1)
     between = float(by_type.mean(axis=1).var())
     shares = {TYPES: between / whole, UNITS: 1.0 - between / whole}
-    for name, columns in _group_numbers(scenarios).items():
-        shares[name] = _explain(values, columns)
-    return shares
+    explained = {name: _explain(values, one) for name, one in _group_numbers(scenarios).items()}
+    return shares | {name: one for name, one in explained.items() if one is not None}
 
 
 def _group_numbers(scenarios: Scenarios) -> dict[str, FloatArray]:
@@ -98,13 +97,14 @@ def _group_numbers(scenarios: Scenarios) -> dict[str, FloatArray]:
     return found
 
 
-def _explain(values: FloatArray, columns: FloatArray) -> float:
+def _explain(values: FloatArray, columns: FloatArray) -> float | None:
     """Share of the variance of values (n,) by a quadratic in columns (n, k), without chance.
+
+    None where there are fewer values than coefficients.
 
     Source: H. Theil, Principles of Econometrics (1971), adjusted coefficient of determination.
     """
-    spread = columns.std(axis=0)
-    varied = columns[:, spread > 0.0]
+    varied = columns[:, np.ptp(columns, axis=0) > 0.0]
     if varied.shape[1] == 0:
         return 0.0
     unit = (varied - varied.mean(axis=0)) / varied.std(axis=0)
@@ -112,5 +112,7 @@ def _explain(values: FloatArray, columns: FloatArray) -> float:
     rows = np.concatenate([np.ones((len(unit), 1)), unit, unit[:, first] * unit[:, second]], axis=1)
     found, _, rank, _ = np.linalg.lstsq(rows, values, rcond=None)
     free = len(values) - int(rank)
-    rest = float(np.sum((values - rows @ found) ** 2)) / free if free > 0 else 0.0
+    if free <= 0:
+        return None
+    rest = float(np.sum((values - rows @ found) ** 2)) / free
     return float(np.clip(1.0 - rest / values.var(ddof=1), 0.0, 1.0))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.oil import SAME_OIL, OilState
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import DrawActuators
 from drivetwin.errors import InputError
@@ -250,12 +251,14 @@ class TwinDraws:
 
     Parts beside the dual clutch are drawn too; parameters without an interval keep their values.
 
-    The covariance is the total one, with sensor tolerances and effects.
+    The covariance is the total one, with sensor tolerances and effects. The friction is that of
+    `oil`, by a slope of each type and a temperature of each unit.
     """
 
     twin: Twin
     shift: Shift
     spread: Spread
+    oil: OilState = SAME_OIL
 
     def __call__(self, random: np.random.Generator) -> MakeDriveline | None:
         """Draw a type; None where it is impossible."""
@@ -264,9 +267,11 @@ class TwinDraws:
         model = known.draw_model(values, random)
         if model is None:
             return None
+        slope = self.oil.draw_slope(random)
 
         def make(random: np.random.Generator) -> Driveline:
-            unit = scale_units(model, self.spread, random)
+            more = self.spread.oil_temperature * float(random.standard_normal())
+            unit = scale_units(self.oil.warm(model, slope, more), self.spread, random)
             return Driveline(unit, self.twin.build_parts(unit, known.to_named(values)))
 
         return make

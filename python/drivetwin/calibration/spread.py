@@ -33,6 +33,9 @@ class Spread:
     engine_lag: float = 0.15
     """Time constant of the engine torque, relative."""
 
+    oil_temperature: float = 5.0
+    """Oil temperature of a shift [K], common to both clutches."""
+
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)

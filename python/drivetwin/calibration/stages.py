@@ -46,7 +46,8 @@ NO_STAGES = NoStages()
 
 def name_stage(kind: str, point: OperatingPoint) -> str:
     """Return the name of a stage at an operating point."""
-    return f"{kind} {point.engine_torque!r} {point.engine_speed!r}"
+    oil = "" if point.oil_temperature is None else f" {point.oil_temperature!r}"
+    return f"{kind} {point.engine_torque!r} {point.engine_speed!r}{oil}"
 
 
 def run_stage(

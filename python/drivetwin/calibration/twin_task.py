@@ -13,6 +13,7 @@ from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.oil import OilFriction, OilState
 from drivetwin.calibration.options import CalibrationOptions
 from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
@@ -22,6 +23,7 @@ from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
 
@@ -37,7 +39,7 @@ _NOT_IDENTIFIED = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
 class Request(CalibrationOptions):
     """Task of a calibration: gears and options, limits, spread between units, effort.
 
-    `controller` is that of the policy `own`.
+    `controller` is that of the policy `own`, `oil` the friction over the oil temperature.
     `start` holds starting values of the policy by name; `limits` None stands for those of the
     start.
     """
@@ -45,6 +47,7 @@ class Request(CalibrationOptions):
     gears: tuple[str, str]
     limits: tuple[Limit, ...] | None = None
     spread: Spread = field(default_factory=Spread)
+    oil: OilFriction = field(default_factory=OilFriction)
     start: Mapping[str, float] = field(default_factory=dict)
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
     controller: UserController | None = None
@@ -58,7 +61,8 @@ def build_task(twin: Twin, request: Request) -> Task:
     """
     require_identified(twin)
     shift = build_nominal_shift(twin, request.gears)
-    model = twin.build_dual_clutch(shift)
+    oil = build_oil_state(twin, request)
+    model = oil.warm(twin.build_dual_clutch(shift))
     point = _choose_point(twin, request)
     delay = twin.get_value(PRESSURE_DELAY, 0.0)
     parts = twin.build_parts(model)
@@ -71,7 +75,7 @@ def build_task(twin: Twin, request: Request) -> Task:
     pressure = _choose_pressure(twin, request)
     setup = PolicySetup(maneuver, pressure, unit, request.task, request.controller)
     policy = POLICIES[request.policy](setup).set_start(request.start)
-    draw = Draw(TwinDraws(twin, shift, request.spread), units)
+    draw = Draw(TwinDraws(twin, shift, request.spread, oil), units)
     task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)
     if request.limits is None:
         task = task.set_limits(derive_limits(task))
@@ -131,7 +135,27 @@ def _choose_point(twin: Twin, request: Request) -> OperatingPoint:
         speed = 0.5 * sum(twin.validity["speed"])
     if not speed > 0.0:
         raise InputError(f"the engine speed is {speed:g} rad/s", "give one above zero")
-    return OperatingPoint(torque, speed)
+    return OperatingPoint(torque, speed, request.oil_temperature)
+
+
+def build_oil_state(twin: Twin, request: Request) -> OilState:
+    """Build the oil of a request against that of the twin's log.
+
+    Raises InputError where a temperature is asked for and that of the log is not known.
+    """
+    wanted, friction = request.oil_temperature, request.oil
+    if wanted is None:
+        return OilState(0.0, friction)
+    known = friction.log_temperature
+    if known is None and OIL_TEMPERATURE in twin.validity:
+        known = 0.5 * sum(twin.validity[OIL_TEMPERATURE])
+    if known is None:
+        raise InputError(
+            f"the twin {twin.name!r} does not say which oil temperature its log had",
+            "identify a log with the role temperature.oil, or state log_temperature_C under [oil] "
+            "in the file of --limits",
+        )
+    return OilState(wanted - known, friction)
 
 
 def _choose_pressure(twin: Twin, request: Request) -> float:

@@ -16,6 +16,9 @@ EXTRA_ROLES = {"motor_torque": Quantity.TORQUE, "motor_speed": Quantity.SPEED}
 PLACED_ROLES = {"shaft_torque": Quantity.TORQUE, "temperature": Quantity.TEMPERATURE}
 """Roles that exist once for each shaft or place: `shaft_torque.halfshaft`, `temperature.oil`."""
 
+OIL_PLACES = ("getriebeoel", "gearoil", "transoil", "atf", "oil", "oel", "fluid", "sump", "sumpf")
+"""Places of the transmission's oil, those that name the transmission first."""
+
 
 def get_place(role: str) -> str | None:
     """Return the shaft or place of a role such as `temperature.oil`; None for another role."""

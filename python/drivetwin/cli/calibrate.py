@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from drivetwin._util.request import REQUIRED, flag, input_file, option, output_folder
+from drivetwin._util.request import CELSIUS, REQUIRED, flag, input_file, option, output_folder
 from drivetwin.calibration.options import CalibrationOptions
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.cli.arguments import RESULT, TWIN, TwinInput
@@ -73,7 +73,7 @@ class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
     front: bool = flag("Add the front of comfort, friction energy and time.", decides=False)
     grid: str | None = option(
         "Grid of operating points, such as torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; from, "
-        "to, points).",
+        "to, points); ,oil=40:100:3 (°C) adds the oil temperature.",
         "--map",
         metavar="GRID",
         decides=False,
@@ -184,6 +184,7 @@ def _build_request(
         gears=gears,
         limits=given.limits or None,
         spread=given.spread,
+        oil=given.oil,
         start=_load_start(request.start, request.policy),
         settings=replace(settings, starts=0) if logs and request.start else settings,
     )
@@ -260,8 +261,9 @@ def _calibrate_grid(twin: Twin, request: Request, text: str, stages: StagesFile)
         )
 
     def make_task(point: OperatingPoint) -> Task:
-        torque, speed = point.engine_torque, point.engine_speed
-        return build_task(twin, replace(request, engine_torque=torque, engine_speed=speed))
+        oil = request.oil_temperature if point.oil_temperature is None else point.oil_temperature
+        at = replace(request, engine_torque=point.engine_torque, engine_speed=point.engine_speed)
+        return build_task(twin, replace(at, oil_temperature=oil))
 
     return calibrate_map(make_task, parse_grid(text), stages)
 
@@ -269,25 +271,30 @@ def _calibrate_grid(twin: Twin, request: Request, text: str, stages: StagesFile)
 def parse_grid(text: str) -> Grid:
     """Parse a grid such as `torque=800:1400:3,speed=1600:2000:3` (N·m, rpm; from, to, points).
 
+    `oil=40:100:3` (°C) adds an axis of the oil temperature.
+
     Raises InputError for another form.
     """
     from drivetwin.calibration.operating_map import Grid
 
-    form = re.compile(r"torque=([^:,]+):([^:,]+):(\d{1,2}),speed=([^:,]+):([^:,]+):(\d{1,2})")
+    axes = (rf"{name}=([^:,]+):([^:,]+):(\d{{1,2}})" for name in ("torque", "speed"))
+    form = re.compile(",".join(axes) + r"(?:,oil=([^:,]+):([^:,]+):(\d{1,2}))?")
     found = form.fullmatch(text.replace(" ", ""))
     try:
-        numbers = [] if found is None else [float(one) for one in found.groups()]
+        numbers = [] if found is None else [float(one) for one in found.groups() if one]
     except ValueError:
         numbers = []
     if not numbers or not all(map(math.isfinite, numbers)):
         raise InputError(
             f"{text!r} is no grid of operating points",
-            "write --map torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; from, to, points)",
+            "write --map torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; from, to, points), with "
+            ",oil=40:100:3 (°C) for an axis of the oil temperature",
         )
     rpm = math.pi / 30.0
     torques = _divide(numbers[0], numbers[1], int(numbers[2]))
     speeds = _divide(numbers[3] * rpm, numbers[4] * rpm, int(numbers[5]))
-    return Grid(torques, speeds)
+    oil = [CELSIUS.offset + one for one in numbers[6:8]]
+    return Grid(torques, speeds, _divide(oil[0], oil[1], int(numbers[8])) if oil else ())
 
 
 def _divide(first: float, last: float, count: int) -> tuple[float, ...]:

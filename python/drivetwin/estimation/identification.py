@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from drivetwin.estimation.result.suggestion import CardNumber, ExperimentRanking
     from drivetwin.estimation.result.validation import HeldOut, Validation
 
+OIL_TEMPERATURE = "oil_temperature"
+"""Name of the oil temperature [K] among the ranges that a log covers."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StageResults:

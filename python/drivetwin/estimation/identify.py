@@ -16,8 +16,8 @@ from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.timed_stages import TimedStages
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
-from drivetwin.estimation.data.shift_data import DesignData, PreparedLog, ShiftSignals
-from drivetwin.estimation.identification import Identification, StageResults
+from drivetwin.estimation.data.shift_data import DesignData, PreparedLog
+from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification, StageResults
 from drivetwin.estimation.linear.estimates import add_tolerances, estimate_integral
 from drivetwin.estimation.paper.pipeline import (
     PaperShift,
@@ -94,7 +94,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
         fit={},
         method=method,
         loss_law=design.loss_law,
-        validity=_compute_validity(log.signals, found),
+        validity=_compute_validity(log, found),
         inputs=dict(log.inputs),
         settings=_collect_settings(design, method),
         evidence=replace(
@@ -253,10 +253,9 @@ def _identify_paper_shifts(log: PreparedLog) -> tuple[PaperShift, ...]:
     )
 
 
-def _compute_validity(
-    signals: Sequence[ShiftSignals], found: EstimateSet
-) -> dict[str, tuple[float, float]]:
-    """Ranges that the identification saw: slip, pressure, torque, speed; SI."""
+def _compute_validity(log: PreparedLog, found: EstimateSet) -> dict[str, tuple[float, float]]:
+    """Ranges that the identification saw: slip, pressure, torque, speed, oil temperature; SI."""
+    signals = log.signals
 
     def span(arrays: list[FloatArray]) -> tuple[float, float]:
         return min(float(a.min()) for a in arrays), max(float(a.max()) for a in arrays)
@@ -268,6 +267,8 @@ def _compute_validity(
     }
     if found.friction:
         ranges["slip"] = (0.0, span([c.slip for c in found.friction.values()])[1])
+    if log.oil_temperature is not None:
+        ranges[OIL_TEMPERATURE] = log.oil_temperature
     return ranges
 
 

@@ -49,6 +49,7 @@ class MapRecord(PointFigures):
 
     engine_torque_Nm: FiniteFloat
     engine_speed_rad_s: FiniteFloat = Field(gt=0)
+    oil_temperature_K: FiniteFloat | None = None
     exceeded: list[Metric] = Field(default_factory=list)
 
 
@@ -79,6 +80,7 @@ def _build_map_record(one: MapPoint) -> MapRecord:
     return MapRecord(
         engine_torque_Nm=point.engine_torque,
         engine_speed_rad_s=point.engine_speed,
+        oil_temperature_K=point.oil_temperature,
         parameters=one.task.policy.name_values(one.found.values),
         peak_jerk_m_s3=one.jerk,
         shift_time_s=quantiles[Metric.SHIFT_TIME].share_95,
@@ -110,6 +112,7 @@ class PointRecord(Record):
     engine_torque_Nm: FiniteFloat
     engine_speed_rad_s: FiniteFloat
     wheel_radius_m: FiniteFloat
+    oil_temperature_K: FiniteFloat | None = None
 
 
 class CalibrationFile(Record):
@@ -179,6 +182,7 @@ def build_calibration_file(
                 "engine_torque_Nm": task.maneuver.point.engine_torque,
                 "engine_speed_rad_s": task.maneuver.point.engine_speed,
                 "wheel_radius_m": task.maneuver.wheel_radius,
+                "oil_temperature_K": task.maneuver.point.oil_temperature,
             },
             "parameters": {
                 one.name: {name: getattr(one, name) for name in _STATED} | {"value": value}
@@ -199,7 +203,8 @@ def write_calibration_file(path: Path, content: CalibrationFile) -> None:
     place = f"Pressures are {content.policy.pressures}. Times count from the request of the gear."
     for line in (_HEADER, place):
         document.add(tomlkit.comment(line))
-    for key, value in content.model_dump(mode="json", by_alias=True).items():
+    values = content.model_dump(mode="json", by_alias=True, exclude_none=True)
+    for key, value in values.items():
         document.add(key, tomlkit.item(value))
     write_text(path, tomlkit.dumps(document))
 

@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, FiniteFloat
+from scipy.constants import zero_Celsius
 
 from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.oil import FRICTION_SLOPE, FRICTION_SLOPE_STD, OilFriction
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
 from drivetwin.files.records import Record
@@ -52,25 +54,51 @@ class SpreadRecord(Record):
     kiss_pressure: FiniteFloat = Field(default=Spread.kiss_pressure, ge=0, alias="kiss_pressure_Pa")
     fill_time: FiniteFloat = Field(default=Spread.fill_time, ge=0, lt=0.5)
     engine_lag: FiniteFloat = Field(default=Spread.engine_lag, ge=0, lt=0.5)
+    oil_temperature: FiniteFloat = Field(
+        default=Spread.oil_temperature, ge=0, lt=100, alias="oil_temperature_K"
+    )
 
     def to_spread(self) -> Spread:
         """Return the spread of the record."""
         return Spread(**dict(self))
 
 
+class OilRecord(Record):
+    """Table `[oil]`: oil temperature of the twin's log, and the friction over the temperature.
+
+    A slope without a standard deviation has the usual relative one.
+    """
+
+    log_temperature_C: Annotated[FiniteFloat, Field(gt=-50, lt=200)] | None = None
+    friction_slope_per_K: Annotated[FiniteFloat, Field(gt=-0.02, lt=0.02)] = FRICTION_SLOPE
+    friction_slope_std_per_K: Annotated[FiniteFloat, Field(ge=0, lt=0.02)] | None = None
+
+    def to_friction(self) -> OilFriction:
+        """Return the friction over the oil temperature."""
+        slope, std = self.friction_slope_per_K, self.friction_slope_std_per_K
+        celsius = self.log_temperature_C
+        return OilFriction(
+            slope,
+            FRICTION_SLOPE_STD * abs(slope) if std is None else std,
+            None if celsius is None else celsius + zero_Celsius,
+        )
+
+
 class LimitsFile(Record):
-    """A file of limits: upper bounds, and the spread between units."""
+    """A file of limits: upper bounds, the spread between units, and the oil."""
 
     limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]]
     spread: SpreadRecord = SpreadRecord()
+    oil: OilRecord = OilRecord()
 
 
 @dataclass(frozen=True)
 class Requirements:
-    """Limits and spread of a file."""
+    """Limits, spread and oil of a file."""
 
     limits: tuple[Limit, ...]
     spread: Spread = field(default_factory=Spread)
+    oil: OilFriction = field(default_factory=OilFriction)
 
 
 def load_limits(path: Path) -> Requirements:
@@ -89,4 +117,4 @@ def load_limits(path: Path) -> Requirements:
     content = LimitsFile.model_validate(document)
     limits = tuple(Limit(keys[name][0], bound, keys[name][1])
                    for name, bound in content.limits.items())  # fmt: skip
-    return Requirements(limits, content.spread.to_spread())
+    return Requirements(limits, content.spread.to_spread(), content.oil.to_friction())

@@ -6,10 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivetwin._util.display_units import RPM, spell_unit
+from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
 from drivetwin.calibration.front import Front
 from drivetwin.calibration.learn import Correction
+from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import MapPoint, OperatingMap
 from drivetwin.calibration.profiles import ClosedLoop
@@ -59,8 +61,10 @@ def render_calibration(
     point = found.task.maneuver.point
     subtitle = (
         f"engine torque {point.engine_torque:.0f} Nm, engine speed "
-        f"{point.engine_speed * 9.549297:.0f} rpm at the request · {draws} fresh draws"
+        f"{point.engine_speed * RPM.factor:.0f} rpm at the request · {draws} fresh draws"
     )
+    if (celsius := _to_celsius(point)) is not None:
+        subtitle += f" · oil at {celsius:.0f} °C"
     around = [build_front_section(front), build_map_section(mapped)]
     sections = _build_sections(found, findings)
     sections[1:1] = [one for one in around if one.blocks]
@@ -182,7 +186,7 @@ def _describe_confidence(found: Calibration) -> str:
         f"Upper bounds by order statistics of {one.draws} draws hold with "
         f"{100.0 * one.confidence:.0f} % confidence; so does: {100.0 * one.worst_share:.2f} % of "
         "all units stay below the worst value drawn. Only the stated spread and the identified "
-        "covariance are drawn: other temperatures and wear are not. The promised value is kept by "
+        "covariance are drawn: wear is not. The promised value is kept by "
         f"95 % of the units of {_describe_types(found)} vehicle types that the log leaves possible."
     )
 
@@ -325,11 +329,16 @@ def build_map_section(mapped: OperatingMap | None) -> Section:
 
 def _build_map_table(caption: str, points: Sequence[MapPoint]) -> TableBlock:
     columns = (
-        *(("engine torque [Nm]", ".0f"), ("engine speed [rpm]", ".0f")),
+        *(("engine torque [Nm]", ".0f"), ("engine speed [rpm]", ".0f"), ("oil [°C]", ".0f")),
         *(("peak jerk, 95 % [m/s³]", ".1f"), ("shift time, 95 % [s]", ".3f")),
         *(("mean friction energy [kJ]", ".1f"), "limits"),
     )
     return make_table(caption, columns, [_build_map_row(one) for one in points])
+
+
+def _to_celsius(point: OperatingPoint) -> float | None:
+    kelvin = point.oil_temperature
+    return None if kelvin is None else kelvin - CELSIUS.offset
 
 
 def _build_map_row(one: MapPoint) -> tuple[object, ...]:
@@ -337,7 +346,7 @@ def _build_map_row(one: MapPoint) -> tuple[object, ...]:
     exceeded = [each for each in certificate.limits if each.state is LimitState.EXCEEDED]
     named = ", ".join(METRICS[each.limit.metric].label for each in exceeded)
     return (
-        *(point.engine_torque, point.engine_speed * RPM.factor, one.jerk),
+        *(point.engine_torque, point.engine_speed * RPM.factor, _to_celsius(point), one.jerk),
         certificate.quantiles[Metric.SHIFT_TIME].share_95,
         1e-3 * certificate.quantiles[Metric.FRICTION_ENERGY].mean,
         Cell(f"exceeds {named}", tone=Tone.DOUBTFUL) if exceeded else "kept",

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin.channels.roles import OIL_PLACES
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError
 from drivetwin.estimation.data.measured_ratios import refine_ratios
@@ -83,7 +84,18 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLo
         inputs={**log.inputs, **card.inputs},
         findings=(*log.findings, *check_lockup_observed(log, card)),
         mapping=log.mapping,
+        oil_temperature=_find_oil_temperature(log, [one.shift for one in fitted]),
     )
+
+
+def _find_oil_temperature(log: ShiftLog, shifts: Sequence[Shift]) -> tuple[float, float] | None:
+    """Range of the oil temperature [K] at the shifts; it varies slowly, so gaps are bridged."""
+    roles = (f"temperature.{place}" for place in OIL_PLACES)
+    channel = next((log[role] for role in roles if role in log), None)
+    if channel is None or channel.time.size == 0:
+        return None
+    seen = np.interp([one.lockup_time for one in shifts], channel.time, channel.values)
+    return float(seen.min()), float(seen.max())
 
 
 def prepare_shift(log: ShiftLog, card: VehicleCard, shift: Shift) -> ShiftData:

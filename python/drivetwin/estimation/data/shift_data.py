@@ -289,7 +289,8 @@ class PreparedLog:
 
     `candidates` are the shifts that were detected, `shifts` the data of those to be fitted and
     `rejected` all others with the reason. `inputs` is the SHA-256 by name of every file, `mapping`
-    the channel mapping by which the log was read.
+    the channel mapping by which the log was read. `oil_temperature` [K] is the range over the
+    shifts to be fitted; None without a sensor.
     """
 
     shifts: tuple[ShiftData, ...]
@@ -301,6 +302,7 @@ class PreparedLog:
     inputs: Mapping[str, str]
     findings: tuple[Finding, ...] = ()
     mapping: RememberedMapping = field(default_factory=RememberedMapping)
+    oil_temperature: tuple[float, float] | None = None
 
     @property
     def signals(self) -> tuple[ShiftSignals, ...]:

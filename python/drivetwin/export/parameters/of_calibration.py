@@ -5,7 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from scipy.constants import zero_Celsius
+
 from drivetwin.calibration.calibrate import Calibration
+from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
@@ -24,7 +27,8 @@ def collect_calibration(
 ) -> ParameterSet:
     """Collect the policy's parameters, and the profiles over the time from the request [s].
 
-    Of a map each parameter is a curve over the engine speed for each engine torque.
+    Of a map each parameter is a curve over the engine speed for each engine torque, and for each
+    oil temperature if the map has an axis of it.
     """
     task = found.task
     values = zip(task.policy.parameters, found.after.values.tolist(), strict=True)
@@ -60,12 +64,23 @@ def _describe_pressures(found: Calibration) -> str:
 def _iterate_map_curves(mapped: OperatingMap) -> Iterator[Curve]:
     grid = mapped.grid
     axis = Axis("engine_speed", grid.speeds, "rad/s")
+    columns = sorted({(place[0], *place[2:]) for place in mapped.points})
     for k, one in enumerate(mapped.main.task.policy.parameters):
-        for i, torque in enumerate(grid.torques):
-            points = (mapped.points[i, j] for j in range(len(grid.speeds)))
+        for torque, *oil in columns:
+            points = [mapped.points[torque, j, *oil] for j in range(len(grid.speeds))]
             values = tuple(float(each.found.values[k]) for each in points)
-            label = f"map.{one.name}.{torque:.0f}_Nm".replace("-", "minus_")
-            yield Curve(label, axis, values, one.unit, f"{one.text}, at {torque:.6g} N*m")
+            label, text = _name_column(points[0].task.maneuver.point)
+            yield Curve(f"map.{one.name}.{label}", axis, values, one.unit, f"{one.text}, {text}")
+
+
+def _name_column(point: OperatingPoint) -> tuple[str, str]:
+    """Return label and words of the torque and oil temperature of a column of a map."""
+    torque, kelvin = point.engine_torque, point.oil_temperature
+    label, text = f"{torque:.0f}_Nm", f"at {torque:.6g} N*m"
+    if kelvin is not None:
+        label += f".{kelvin - zero_Celsius:.0f}_degC"
+        text += f" and oil at {kelvin:.6g} K"
+    return label.replace("-", "minus_"), text
 
 
 def _build_curve(name: str, signal: Signal, request: float, labels: tuple[str, str]) -> Curve:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from drivetwin._util.display_units import BAR, NM, RAD_PER_S, RPM, Display
 from drivetwin._util.version import get_program_version
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification
 from drivetwin.report.blocks import Section, TableBlock, make_notes, make_table
 from drivetwin.twin.build import list_borrowed_friction
 
@@ -14,6 +14,7 @@ _RANGES: dict[str, tuple[str, Display]] = {
     "pressure": ("pressure", BAR),
     "torque": ("engine torque", NM),
     "speed": ("engine speed", RPM),
+    OIL_TEMPERATURE: ("oil temperature", Display("K")),
 }
 
 
