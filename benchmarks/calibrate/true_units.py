@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.calibrate.true_vehicle import MadeVehicle
 from benchmarks.estimation.vehicles import draw_errors, misread_channels
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics
+from drivetwin.calibration.metrics import Metric, Outcome, Runs, compute_metrics
 from drivetwin.calibration.profiles import Control, Profiles
 from drivetwin.calibration.scenarios import scale_units
 from drivetwin.calibration.spread import Spread
@@ -63,7 +63,7 @@ class TrueUnits:
             ]
             locks.append(held[-1] if held else float("nan"))
         vehicle = np.full(len(runs), shift.model.J_v)
-        return compute_metrics(shift, np.stack(runs), np.array(locks), vehicle, _METRICS)
+        return compute_metrics(shift, Runs(np.stack(runs), np.array(locks)), vehicle, _METRICS)
 
 
 def draw_true_units(

@@ -32,7 +32,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.metrics import Metric, compute_metrics
+from drivetwin.calibration.metrics import Metric, Runs, compute_metrics
 from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.channels.pressure_roles import make_command_role
 from drivetwin.channels.shiftlog import Quantity
@@ -176,7 +176,7 @@ def measure_true_shift(
     locks = [one.time for one in run_true.events if one.kind == "lock" and one.element == name]
     lock = locks[-1] if locks else float("nan")
     vehicle = np.array([made.scenario.model.J_v])
-    outcome = compute_metrics(shift, columns[None], np.array([lock]), vehicle)
+    outcome = compute_metrics(shift, Runs(columns[None], np.array([lock])), vehicle)
     return {metric: float(values[0]) for metric, values in outcome.values.items()}
 
 

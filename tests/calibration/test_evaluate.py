@@ -24,7 +24,14 @@ from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE
 from drivetwin.simulation.network import simulate
 from drivetwin.simulation.vehicle_parts import NO_PARTS
-from tests.calibration.cases import QUICK, SYSTEM, make_draws, make_plant, make_upshift
+from tests.calibration.cases import (
+    QUICK,
+    SYSTEM,
+    make_draws,
+    make_plant,
+    make_slip_task,
+    make_upshift,
+)
 from tests.calibration.twins import PARTS, add_part, assemble, make_hydraulic_twin
 
 
@@ -56,7 +63,7 @@ def test_late_pressures_move_the_shift_by_their_delay() -> None:
     locks = []
     for delay in (0.0, 0.01):
         plant, draws = make_plant(replace(shift, pressure_delay=delay)), make_draws(shift, 4)
-        locks.append(plant.simulate(control, draws, (shift.body.drive,))[1])
+        locks.append(plant.simulate(control, draws, (shift.body.drive,)).last_lock)
     np.testing.assert_allclose(locks[1] - locks[0], 0.01, rtol=0.1)
 
 
@@ -76,7 +83,7 @@ def test_the_predicted_motion_is_that_of_the_whole_network(part: str, kind: Poli
     nominal = replace(collect_scenarios(shift, [shift.driveline]), units=drawn.units)
     if isinstance(control, ClosedLoop):
         nominal = replace(nominal, units=[control.unit])
-    columns, _ = make_plant(shift).simulate(control, nominal, list_outputs(shift))
+    columns = make_plant(shift).simulate(control, nominal, list_outputs(shift)).columns
     profiles = compute_nominal_profiles(shift, control)
     inputs = {
         ENGINE_TORQUE: profiles.engine_torque,
@@ -105,7 +112,7 @@ def compare_with_reduced(
 
     def run(one: Maneuver) -> tuple[FloatArray, Outcome]:
         plant, nominal = make_plant(one), collect_scenarios(one, [one.driveline])
-        columns, _ = plant.simulate(control, nominal, list_outputs(one))
+        columns = plant.simulate(control, nominal, list_outputs(one)).columns
         return columns[0, 0], plant.evaluate(control, nominal)
 
     return run(shift), run(replace(shift, parts=NO_PARTS))
@@ -138,3 +145,18 @@ def test_play_acts_from_the_reversal_of_the_torque_on() -> None:
     np.testing.assert_allclose(torque[:reversal], reduced[:reversal], atol=1e-3)
     assert not torque[reversal : reversal + 4].any()
     assert whole.values[Metric.PEAK_JERK] > other.values[Metric.PEAK_JERK]
+
+
+def test_inputs_of_a_closed_loop_are_those_of_its_nominal_profiles() -> None:
+    task = make_slip_task()
+    shift, space = task.maneuver, Space(task.policy)
+    control = space.build_control(space.start)
+    assert isinstance(control, ClosedLoop)
+    nominal = replace(collect_scenarios(shift, [shift.driveline]), units=[control.unit])
+    found = make_plant(shift).evaluate(control, nominal).values
+    profiles = compute_nominal_profiles(shift, control)
+    depth = np.abs(profiles.engine_torque.values - shift.point.engine_torque).max()
+    rates = [np.abs(np.diff(one.values)).max() for one in (profiles.offgoing, profiles.oncoming)]
+    assert depth > 0.0
+    assert found[Metric.TORQUE_REDUCTION] == pytest.approx([depth])
+    assert found[Metric.PRESSURE_RATE] == pytest.approx([max(rates) / shift.step])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.metrics import METRICS, Metric, Outcome, compute_metrics
+from drivetwin.calibration.metrics import METRICS, OF_INPUTS, Metric, Outcome, Runs, compute_metrics
 from drivetwin.simulation.dual_clutch import FloatArray
 from tests.calibration.cases import make_downshift, make_upshift
 
@@ -15,16 +15,30 @@ UP = make_upshift()
 TIME = UP.time
 
 
-def measure(shift: Maneuver = UP, lock: float = 0.9, **signals: FloatArray) -> Outcome:
+def measure(
+    shift: Maneuver = UP, lock: float = 0.9, inputs: FloatArray | None = None, **signals: FloatArray
+) -> Outcome:
     """Metrics of one run with some of its signals; the others are zero."""
     names = ("torque", "off", "off_slip", "on", "on_slip")
     columns = np.stack([signals.get(name, np.zeros_like(TIME)) for name in names])[None]
-    return compute_metrics(shift, columns, np.array([lock]), np.array([shift.model.J_v]))
+    runs = Runs(columns, np.array([lock]), inputs)
+    return compute_metrics(shift, runs, np.array([shift.model.J_v]))
 
 
 def test_every_metric_is_defined() -> None:
     assert set(METRICS) == set(Metric)
-    assert set(measure().values) == set(Metric)
+    assert set(measure(inputs=np.zeros((1, 3, TIME.size))).values) == set(Metric)
+    assert set(Metric) - set(measure().values) == set(OF_INPUTS)
+
+
+def test_intervention_and_rate_are_those_of_the_inputs() -> None:
+    torque = UP.point.engine_torque - 300.0 * np.exp(-(((TIME - 0.5) / 0.1) ** 2))
+    falling = np.interp(TIME, [0.2, 0.4], [8e5, 0.0])
+    rising = np.interp(TIME, [0.3, 0.8], [0.0, 1e6])
+    inputs = np.stack([torque, falling, rising])[None]
+    found = measure(inputs=inputs).values
+    assert found[Metric.TORQUE_REDUCTION] == pytest.approx([300.0])
+    assert found[Metric.PRESSURE_RATE] == pytest.approx([4e6])
 
 
 def test_jerk_and_dose_of_a_sine() -> None:

@@ -45,3 +45,26 @@ def test_start_moves_onto_the_bounds() -> None:
 def test_bounds_contain_the_start(bounds: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match="bounds"):
         replace(POLICY, parameters=(PolicyParameter("a", "s", *bounds, ""),))
+
+
+def test_bounds_are_narrowed_widened_and_closed() -> None:
+    depth = next(one for one in POLICY.parameters if one.name == "reduction_depth")
+    bounds = {"reduction_depth": (0.0, 100.0), "fill_time": (0.5, 0.5), "kiss_pressure": (0.0, 9e5)}
+    found = {one.name: one for one in POLICY.set_bounds(bounds).parameters}
+    assert depth.start > 100.0
+    assert (found["reduction_depth"].start, found["reduction_depth"].high) == (100.0, 100.0)
+    assert found["fill_time"].start == 0.5
+    assert not found["fill_time"].free
+    assert found["kiss_pressure"].high == 9e5
+    with pytest.raises(InputError, match="no parameter b"):
+        POLICY.set_bounds({"b": (0.0, 1.0)})
+
+
+def test_bounds_that_bind_are_listed() -> None:
+    values = SPACE.to_values(np.full(len(SPACE.free), 0.5))
+    assert POLICY.list_at_bounds(values) == []
+    names = [POLICY.parameters[k].name for k in SPACE.free]
+    values = SPACE.to_values(np.array([1.0, *np.full(len(names) - 2, 0.5), 0.0]))
+    found = POLICY.list_at_bounds(values)
+    assert [one.name for one, _ in found] == [names[0], names[-1]]
+    assert [end for _, end in found] == [found[0][0].high, found[1][0].low]

@@ -67,7 +67,7 @@ def test_a_torque_scale_is_a_scale_of_the_torque() -> None:
     pressures = {"2": profiles.offgoing, "3": profiles.oncoming}
     exact = simulate(shift.model, torque, pressures, louder.build_start(), shift.time)
     drawn = collect_scenarios(shift, [Driveline(unit)])
-    columns, _ = make_plant(shift).simulate(profiles, drawn, (shift.body.drive,))
+    columns = make_plant(shift).simulate(profiles, drawn, (shift.body.drive,)).columns
     largest = np.abs(exact.shaft_torque).max()
     assert columns[0, 0] == pytest.approx(exact.shaft_torque, abs=1e-5 * largest)
 

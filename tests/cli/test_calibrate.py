@@ -317,3 +317,32 @@ def test_an_interrupted_calibration_continues_to_the_same_result(
         assert (out / name).read_bytes() == (whole / name).read_bytes()
     assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 2
     assert "no interrupted calibration" in capsys.readouterr().err
+
+
+def test_own_bounds_limits_and_labels_are_kept(twin: Path, tmp_path: Path) -> None:
+    limits, template, out = (tmp_path / name for name in ("limits.toml", "own.toml", "out"))
+    limits.write_text(
+        "[limits]\ntorque_reduction_Nm = 400\npressure_rate_Pa_s = 3e7\n"
+        "[bounds]\nreduction_depth = [0, 300]\nfill_time = 0.1\n"
+    )
+    template.write_text(
+        '[parameters.kiss_pressure]\nlabel = "Clt_pKiss_C"\nunit = "bar"\n'
+        '[parameters."profile.engine_torque"]\nlabel = "Eng_tq_CUR"\n'
+        'axis = { name = "Shf_ti", unit = "ms", points = [0, 400, 800], beyond = "hold" }\n'
+    )
+    given = ["--shift", "2-3", "--limits", str(limits), "--template", str(template)]
+    assert main(["calibrate", str(twin), *given, *SHORT, "-o", str(out)]) == 0
+    found = read_calibration_file(out / "calibration.toml").parameters
+    assert found["reduction_depth"].value <= 300.0
+    assert found["fill_time"].value == 0.1
+    after = json.loads((out / "certificate.json").read_text(encoding="utf-8"))["after"]
+    metrics = after["quantiles"]
+    assert metrics["torque_reduction"]["worst"] == pytest.approx(found["reduction_depth"].value)
+    assert 0.0 < metrics["pressure_rate"]["worst"] <= 3e7
+    for ending in ("csv", "dcm", "cdfx"):
+        content = read_parameters(out / f"calibration.{ending}")
+        assert {one.name for one in content.entries} == {"Clt_pKiss_C", "Eng_tq_CUR"}
+        (curve,) = content.curves
+        assert curve.axis.points == (0.0, 400.0, 800.0)
+        (kiss,) = content.scalars
+        assert kiss.value == pytest.approx(found["kiss_pressure"].value / 1e5)

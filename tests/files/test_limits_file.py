@@ -41,6 +41,19 @@ def test_reads_the_spread(tmp_path: Path) -> None:
     )
 
 
+def test_reads_bounds_and_oil(tmp_path: Path) -> None:
+    path = tmp_path / "limits.toml"
+    path.write_text(
+        "[limits]\n[bounds]\nfill_time = 0.09\nreduction_depth = [0, 300]\n"
+        "[oil]\nlog_temperature_C = 80\nfriction_slope_per_K = -2e-3\n"
+    )
+    found = load_limits(path)
+    assert found.bounds == {"fill_time": (0.09, 0.09), "reduction_depth": (0.0, 300.0)}
+    assert found.oil.slope == -2e-3
+    assert found.oil.std == pytest.approx(6e-4)
+    assert found.oil.log_temperature == pytest.approx(353.15)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -53,6 +66,9 @@ def test_reads_the_spread(tmp_path: Path) -> None:
         ("[limits]\n[spread]\ngian = 0.1\n", r"gian"),
         ("[limits]\n[spread]\ndead_time = 0.1\n", r"unknown key 'dead_time'; write 'dead_time_s'"),
         ("limits = 3\n", "limits"),
+        ("[limits]\n[bounds]\na = [2, 1]\n", r"bounds.a.*does not increase"),
+        ("[limits]\n[bounds]\na = 'x'\n", r"bounds.a"),
+        ("[limits]\n[oil]\nlog_temperature_C = -300\n", r"oil.log_temperature_C"),
         ("[limits\n", "no valid TOML"),
     ],
 )

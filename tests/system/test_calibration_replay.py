@@ -11,7 +11,7 @@ import pytest
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, calibrate
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
-from drivetwin.calibration.metrics import METRICS, Metric, Outcome, compute_metrics
+from drivetwin.calibration.metrics import METRICS, Metric, Outcome, Runs, compute_metrics
 from drivetwin.calibration.objective import Limit
 from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
@@ -132,10 +132,13 @@ def test_a_calibration_has_the_metrics_of_another_simulator(name: str) -> None:
     control, of = calibrated.after.control, make_unit(case.of)
     found = simulate(case, control, of)
     columns, lock = solve(case, control, of)
-    expected = compute_metrics(case.shift, columns[None], np.array([lock]), np.array([of.J_v]))
-    for metric, spec in METRICS.items():
+    expected = compute_metrics(
+        case.shift, Runs(columns[None], np.array([lock])), np.array([of.J_v])
+    )
+    for metric, values in expected.values.items():
+        spec = METRICS[metric]
         share = 1e-3 if metric is Metric.PEAK_JERK else 1e-2
-        value = float(expected.values[metric][0])
+        value = float(values[0])
         near = NEAR.get(spec.unit, 0.0)
         assert found.values[metric][0] == pytest.approx(value, rel=share, abs=near), metric
     assert not found.unlocked[0]

@@ -40,6 +40,7 @@ _BY_SI = {
     "N*m*s^2/rad^2": Display("Nm·s²/rad²"),
     "Hz": Display("Hz"),
     "Pa": BAR,
+    "Pa/s": Display("bar/s", BAR.factor),
     "rad/s": RPM,
     "m/s^2": Display("m/s²"),
     "m/s^3": Display("m/s³"),

@@ -10,7 +10,14 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list_outputs
+from drivetwin.calibration.metrics import (
+    OF_INPUTS,
+    Metric,
+    Outcome,
+    Runs,
+    compute_metrics,
+    list_outputs,
+)
 from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import BatchRequest, Keep
@@ -65,13 +72,11 @@ class Plant:
                 if together
                 else (self.simulate(one, chosen, outputs) for one in controls)
             )
-            parts.append([self._measure(columns, lock, chosen) for columns, lock in runs])
+            parts.append([self._measure(one, chosen) for one in runs])
         return [_join(list(one)) for one in zip(*parts, strict=True)]
 
-    def simulate(
-        self, control: Control, scenarios: Scenarios, outputs: tuple[Output, ...]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return outputs (runs, outputs, n) and times of the last lock-up (runs,) [s]."""
+    def simulate(self, control: Control, scenarios: Scenarios, outputs: tuple[Output, ...]) -> Runs:
+        """Simulate a control over scenarios."""
         if isinstance(control, ClosedLoop):
             return self._run_closed_loops([control], scenarios, outputs)[0]
         self.count.runs += scenarios.count
@@ -87,27 +92,38 @@ class Plant:
         # Checks of `simulate_network_batch` take a tenth of a run, and these elements are built.
         asked = BatchRequest.build(given, shift.time, scenarios.sets, native, Keep.COLUMNS)
         batch = asked.simulate(as_json(shift.elements), asked.sets, self.threads)
-        return batch.values, batch.last_lock
+        pressures = (sampled.offgoing.values, sampled.oncoming.values)
+        seen = np.stack([sampled.engine_torque.values, *pressures])[None]
+        return Runs(batch.values, batch.last_lock, seen)
 
     def _run_closed_loops(
         self, controls: Sequence[ClosedLoop], scenarios: Scenarios, outputs: tuple[Output, ...]
-    ) -> list[tuple[FloatArray, FloatArray]]:
+    ) -> list[Runs]:
         """Simulate all controllers on all scenarios together; as `simulate` for each controller."""
         self.count.runs += len(controls) * scenarios.count
         shift = self.maneuver
         plant = shift.build_controlled(scenarios.units, scenarios.sets)
+        wanted = any(one in OF_INPUTS for one in self.metrics)
         batch = simulate_network_controlled(
             plant,
             [one.controller for one in controls],
             shift.time,
             outputs,
+            with_inputs=wanted,
             threads=self.threads,
         )
-        return [(batch.values[:, k], batch.last_lock[:, k]) for k in range(len(controls))]
+        return [
+            Runs(
+                batch.values[:, k],
+                batch.last_lock[:, k],
+                batch.inputs[:, k, :3] if wanted else None,
+            )
+            for k in range(len(controls))
+        ]
 
-    def _measure(self, columns: FloatArray, last_lock: FloatArray, chosen: Scenarios) -> Outcome:
+    def _measure(self, runs: Runs, chosen: Scenarios) -> Outcome:
         vehicle = get_vehicle_inertias(self.maneuver, chosen)
-        return compute_metrics(self.maneuver, columns, last_lock, vehicle, self.metrics)
+        return compute_metrics(self.maneuver, runs, vehicle, self.metrics)
 
 
 def get_vehicle_inertias(maneuver: Maneuver, scenarios: Scenarios) -> FloatArray:

@@ -43,6 +43,8 @@ class Metric(StrEnum):
     PEAK_POWER = auto()
     FLARE = auto()
     TIE_UP = auto()
+    TORQUE_REDUCTION = auto()
+    PRESSURE_RATE = auto()
 
 
 @dataclass(frozen=True)
@@ -119,8 +121,22 @@ METRICS: Mapping[Metric, MetricSpec] = {
         "Largest torque of the off-going element against the direction of power.",
         _OWN,
     ),
+    Metric.TORQUE_REDUCTION: MetricSpec(
+        "engine torque intervention",
+        "N*m",
+        "Largest difference between the engine torque and the driver's demand.",
+        _OWN,
+    ),
+    Metric.PRESSURE_RATE: MetricSpec(
+        "pressure rate",
+        "Pa/s",
+        "Largest magnitude of the rate of a pressure at the clutches.",
+        _OWN,
+    ),
 }
 """Definitions of the metrics, in the order of reports."""
+OF_INPUTS = (Metric.TORQUE_REDUCTION, Metric.PRESSURE_RATE)
+"""Metrics that need the inputs of the driveline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +172,20 @@ def compute_acceleration(maneuver: Maneuver, drive: FloatArray, vehicle: FloatAr
 
 
 @dataclass(frozen=True, eq=False)
+class Runs:
+    """Runs with one control: `columns` (runs, outputs, n) as `list_outputs` orders them.
+
+    `last_lock` (runs,) [s] is the time of the last lock-up, NaN without one. `inputs` (runs, 3, n)
+    or (1, 3, n) are engine torque [N m], off-going and on-coming pressure [Pa] at the clutches;
+    None where no metric needs them.
+    """
+
+    columns: FloatArray
+    last_lock: FloatArray
+    inputs: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class _Runs:
     """Signals (runs, n) of the runs of a batch, with what several metrics need."""
 
@@ -167,6 +197,7 @@ class _Runs:
     on_slip: FloatArray
     last_lock: FloatArray
     acceleration: FloatArray
+    inputs: FloatArray | None
 
     @cached_property
     def jerk(self) -> FloatArray:
@@ -181,23 +212,25 @@ class _Runs:
 
 def compute_metrics(
     maneuver: Maneuver,
-    columns: FloatArray,
-    last_lock: FloatArray,
+    found: Runs,
     vehicle: FloatArray,
     wanted: Iterable[Metric] = tuple(Metric),
 ) -> Outcome:
-    """Compute the `wanted` metrics from `columns` (runs, outputs, n) as `list_outputs` orders them.
+    """Compute the `wanted` metrics of runs; those of inputs only where the runs have them.
 
-    `last_lock` (runs,) [s] is that of the batch; `vehicle` (runs,) the inertia of `maneuver.body`
-    [kg m^2] in each run. A run that failed has 1e6 in every metric.
+    `vehicle` (runs,) is the inertia of `maneuver.body` [kg m^2] in each run. A run that failed has
+    1e6 in every metric.
     """
+    columns, last_lock = found.columns, found.last_lock
     failed = ~np.isfinite(columns).all(axis=(1, 2))
     signals = np.moveaxis(np.nan_to_num(columns) if failed.any() else columns, 1, 0)
     torque, off, off_slip, on, on_slip, *_ = signals
     drive = signals[list_outputs(maneuver).index(maneuver.body.drive)]
     acceleration = compute_acceleration(maneuver, drive, vehicle)
-    runs = _Runs(maneuver, torque, off, off_slip, on, on_slip, last_lock, acceleration)
-    values = {one: _COMPUTE[one](runs) for one in wanted}
+    seen = (torque, off, off_slip, on, on_slip)
+    runs = _Runs(maneuver, *seen, last_lock, acceleration, found.inputs)
+    known = (one for one in wanted if found.inputs is not None or one not in OF_INPUTS)
+    values = {one: _COMPUTE[one](runs) for one in known}
     for one in values.values():
         one[failed] = _FAILED
     unlocked = np.abs(runs.on_slip[:, -1]) > _LOCKED
@@ -257,6 +290,23 @@ def _compute_tie_up(runs: _Runs) -> FloatArray:
     return np.asarray(np.maximum(-np.sign(runs.off[:, :1]) * runs.off, 0.0).max(axis=1))
 
 
+def _compute_torque_reduction(runs: _Runs) -> FloatArray:
+    assert runs.inputs is not None
+    demand = runs.maneuver.point.engine_torque
+    return _extend(np.abs(runs.inputs[:, 0] - demand).max(axis=-1), runs)
+
+
+def _compute_pressure_rate(runs: _Runs) -> FloatArray:
+    assert runs.inputs is not None
+    steps = np.abs(np.diff(runs.inputs[:, 1:], axis=-1)).max(axis=(-1, -2))
+    return _extend(steps / runs.maneuver.step, runs)
+
+
+def _extend(values: FloatArray, runs: _Runs) -> FloatArray:
+    """Return values (runs,) of those of each run or of all runs alike."""
+    return np.array(np.broadcast_to(values, runs.last_lock.shape))
+
+
 _COMPUTE: Mapping[Metric, Callable[[_Runs], FloatArray]] = {
     Metric.PEAK_JERK: _compute_peak_jerk,
     Metric.SMOOTH_JERK: _compute_smooth_jerk,
@@ -268,6 +318,8 @@ _COMPUTE: Mapping[Metric, Callable[[_Runs], FloatArray]] = {
     Metric.PEAK_POWER: _compute_peak_power,
     Metric.FLARE: _compute_flare,
     Metric.TIE_UP: _compute_tie_up,
+    Metric.TORQUE_REDUCTION: _compute_torque_reduction,
+    Metric.PRESSURE_RATE: _compute_pressure_rate,
 }
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -13,6 +13,10 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.profiles import Control
 from drivetwin.errors import InputError
+
+_AT_BOUND = 1e-4
+"""Distance from a bound, over the range, within which a parameter is at it: linear programs end on
+it to their tolerance."""
 
 
 @dataclass(frozen=True)
@@ -58,21 +62,51 @@ class Policy:
 
         Raises InputError for an unknown name.
         """
-        names = [one.name for one in self.parameters]
-        if unknown := [name for name in values if name not in names]:
-            raise InputError(
-                f"the policy has no parameter {', '.join(unknown)}", f"use {', '.join(names)}"
-            )
+        self._refuse_unknown(values)
         moved = tuple(
             replace(one, start=min(max(values.get(one.name, one.start), one.low), one.high))
             for one in self.parameters
         )
         return replace(self, parameters=moved)
 
+    def set_bounds(self, bounds: Mapping[str, tuple[float, float]]) -> Self:
+        """Return the policy with other bounds by name (SI), and starting values moved onto them.
+
+        A parameter with equal bounds keeps that value. Raises InputError for an unknown name.
+        """
+        self._refuse_unknown(bounds)
+        changed = []
+        for one in self.parameters:
+            low, high = bounds.get(one.name, (one.low, one.high))
+            start = min(max(one.start, low), high)
+            if low == high:  # its old bounds stay, as those of a parameter that is not free
+                low, high = min(one.low, start), max(one.high, start)
+                changed.append(replace(one, low=low, high=high, start=start, free=False))
+            else:
+                changed.append(replace(one, low=low, high=high, start=start))
+        return replace(self, parameters=tuple(changed))
+
+    def list_at_bounds(self, values: FloatArray) -> list[tuple[PolicyParameter, float]]:
+        """List the free parameters of values (p,) that end at a bound, with that bound."""
+        found = []
+        for one, value in zip(self.parameters, values.tolist(), strict=True):
+            near = _AT_BOUND * (one.high - one.low)
+            bounds = [end for end in (one.low, one.high) if abs(value - end) <= near]
+            if one.free and bounds:
+                found.append((one, bounds[0]))
+        return found
+
     def name_values(self, values: FloatArray) -> dict[str, float]:
         """Return values (p,) by the names of the parameters."""
         names = (one.name for one in self.parameters)
         return dict(zip(names, values.tolist(), strict=True))
+
+    def _refuse_unknown(self, given: Iterable[str]) -> None:
+        names = [one.name for one in self.parameters]
+        if unknown := [name for name in given if name not in names]:
+            raise InputError(
+                f"the policy has no parameter {', '.join(unknown)}", f"use {', '.join(names)}"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,14 +40,15 @@ class Request(CalibrationOptions):
     """Task of a calibration: gears and options, limits, spread between units, effort.
 
     `controller` is that of the policy `own`, `oil` the friction over the oil temperature.
-    `start` holds starting values of the policy by name; `limits` None stands for those of the
-    start.
+    `start` holds starting values and `bounds` bounds (SI) of the policy by name; `limits` None
+    stands for those of the start.
     """
 
     gears: tuple[str, str]
     limits: tuple[Limit, ...] | None = None
     spread: Spread = field(default_factory=Spread)
     oil: OilFriction = field(default_factory=OilFriction)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
     controller: UserController | None = None
@@ -74,7 +75,8 @@ def build_task(twin: Twin, request: Request) -> Task:
     unit = None if units is None else units.nominal
     pressure = _choose_pressure(twin, request)
     setup = PolicySetup(maneuver, pressure, unit, request.task, request.controller)
-    policy = POLICIES[request.policy](setup).set_start(request.start)
+    policy = POLICIES[request.policy](setup).set_bounds(request.bounds)
+    policy = policy.set_start(request.start)
     draw = Draw(TwinDraws(twin, shift, request.spread, oil), units)
     task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)
     if request.limits is None:

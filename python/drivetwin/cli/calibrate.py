@@ -78,6 +78,9 @@ class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
         metavar="GRID",
         decides=False,
     )
+    template: Path | None = input_file(
+        "Template of the parameter files: labels, units, axes and breakpoints (TOML)."
+    )
     resume: bool = flag("Continue an interrupted calibration from DIR.resume.json.", decides=False)
     from_logs: tuple[Path, ...] = input_file(
         "Log of the vehicle's shifts with an earlier calibration (may be repeated): it corrects "
@@ -185,6 +188,7 @@ def _build_request(
         limits=given.limits or None,
         spread=given.spread,
         oil=given.oil,
+        bounds=given.bounds,
         start=_load_start(request.start, request.policy),
         settings=replace(settings, starts=0) if logs and request.start else settings,
     )
@@ -345,6 +349,7 @@ def _write_results(
     from drivetwin.cli.atomic_outputs import write_atomically
     from drivetwin.export.parameters.files import ParameterFormat, write_parameters
     from drivetwin.export.parameters.of_calibration import collect_calibration
+    from drivetwin.export.parameters.template import apply_template, read_template, require_labels
     from drivetwin.files.calibration_file import (
         Provenance,
         build_calibration_file,
@@ -369,6 +374,9 @@ def _write_results(
     )
     name = f"{twin.name} {label}"
     content = collect_calibration(found, name, mapped)
+    form = None if request.template is None else read_template(request.template)
+    if form is not None:
+        content = apply_template(content, form)
     with write_atomically(request.output) as folder:
         write_calibration_file(
             folder / CALIBRATION, build_calibration_file(found, provenance, front, mapped)
@@ -376,6 +384,8 @@ def _write_results(
         certificate = build_certificate_document(found)
         write_text(folder / CERTIFICATE, json.dumps(certificate, indent=2, allow_nan=False) + "\n")
         for kind in (ParameterFormat.CSV, ParameterFormat.DCM, ParameterFormat.CDFX):
+            if form is not None:
+                require_labels(content, form, kind)
             write_parameters(content, folder / f"calibration.{kind.value}", kind)
         page = render_calibration(found, f"Calibration of {name}", findings, front, mapped)
         write_text(folder / REPORT, page)

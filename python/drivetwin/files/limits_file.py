@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -27,6 +28,7 @@ _SUFFIX = {
     "J": "J",
     "W": "W",
     "rad/s": "rad_s",
+    "Pa/s": "Pa_s",
 }
 """Units as keys of a file have them."""
 
@@ -85,20 +87,28 @@ class OilRecord(Record):
 
 
 class LimitsFile(Record):
-    """A file of limits: upper bounds, the spread between units, and the oil."""
+    """A file of limits: upper bounds, the spread between units, the oil, bounds of parameters."""
 
     limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]]
     spread: SpreadRecord = SpreadRecord()
     oil: OilRecord = OilRecord()
+    bounds: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat]] = Field(default_factory=dict)
+
+    def list_bounds(self) -> dict[str, tuple[float, float]]:
+        """Return lower and upper bounds of parameters; equal ones where a number is given."""
+        return {
+            name: one if isinstance(one, tuple) else (one, one) for name, one in self.bounds.items()
+        }
 
 
 @dataclass(frozen=True)
 class Requirements:
-    """Limits, spread and oil of a file."""
+    """Limits, spread and oil of a file, and bounds of the policy's parameters by name."""
 
     limits: tuple[Limit, ...]
     spread: Spread = field(default_factory=Spread)
     oil: OilFriction = field(default_factory=OilFriction)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def load_limits(path: Path) -> Requirements:
@@ -112,9 +122,16 @@ def load_limits(path: Path) -> Requirements:
         for name in (table if isinstance(table, dict) else ())
         if name not in keys
     ]
-    faults = [*validate_schema(document, LimitsFile), *unknown]
+    bounds = document.get("bounds")
+    reversed_ones = [
+        Fault(f"bounds.{name}", f"{one[0]!r} to {one[1]!r} does not increase")
+        for name, one in (bounds.items() if isinstance(bounds, dict) else ())
+        if isinstance(one, list) and len(one) == 2 and not one[0] < one[1]
+    ]
+    faults = [*validate_schema(document, LimitsFile), *unknown, *reversed_ones]
     raise_faults(faults, InputError, str(path), remedy)
     content = LimitsFile.model_validate(document)
     limits = tuple(Limit(keys[name][0], bound, keys[name][1])
                    for name, bound in content.limits.items())  # fmt: skip
-    return Requirements(limits, content.spread.to_spread(), content.oil.to_friction())
+    drawn = content.spread.to_spread(), content.oil.to_friction()
+    return Requirements(limits, *drawn, content.list_bounds())

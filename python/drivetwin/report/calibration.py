@@ -101,7 +101,12 @@ def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Sec
             "Each metric over the fresh draws; lines are limits (dashed: of the mean).",
             [FigureBlock(plot_distributions(found), "Share of the draws.")],
         ),
-        Section("parameters", "Parameters", "Policy before and after.", [_build_values(found)]),
+        Section(
+            "parameters",
+            "Parameters",
+            "Policy before and after.",
+            [_build_bounds(found), _build_values(found)],
+        ),
         Section("definitions", "Metrics", "Definition and source.", [_build_definitions()]),
     ]
 
@@ -141,7 +146,7 @@ def build_calibration_blocks(
     tables = [one for section in around for one in section.blocks]
     return [
         *(_build_limits(found), _build_statistics(found), _build_events(found)),
-        _build_shares(found),
+        *(_build_shares(found), _build_bounds(found)),
         *tables,
         *build_findings_section(findings).blocks,
     ]
@@ -257,6 +262,15 @@ def _build_values(found: Calibration) -> TableBlock:
     numbers = ((name, ".5g") for name in ("before", "after", "low", "high"))
     columns: Sequence[Column] = ("parameter", "unit", *numbers, "meaning")
     return make_table("Parameters of the policy, SI", columns, rows)
+
+
+def _build_bounds(found: Calibration) -> TableBlock:
+    rows = [
+        (one.name, spell_unit(one.unit), end, "lower" if end == one.low else "upper", one.text)
+        for one, end in found.task.policy.list_at_bounds(found.after.values)
+    ]
+    columns: Sequence[Column] = ("parameter", "unit", ("bound", ".5g"), "side", "meaning")
+    return make_table(f"Bounds that bind: {len(rows)}", columns, rows)
 
 
 def _build_definitions() -> TableBlock:

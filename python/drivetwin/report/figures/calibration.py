@@ -123,7 +123,8 @@ def _simulate_bands(found: Calibration, one: Assessment) -> tuple[_Band, _Band]:
     shift = found.task.maneuver
     draws = found.fresh.select(slice(0, _DRAWN))
     outputs: tuple[Output, ...] = (shift.body.drive, ("slip", shift.oncoming.name))
-    columns, _ = Plant(shift, found.task.settings.threads).simulate(one.control, draws, outputs)
+    runs = Plant(shift, found.task.settings.threads, ()).simulate(one.control, draws, outputs)
+    columns = runs.columns
     vehicle = get_vehicle_inertias(shift, draws)
     acceleration = compute_acceleration(shift, columns[:, 0], vehicle)
     return _compute_band(acceleration), _compute_band(columns[:, 1])
