@@ -29,6 +29,7 @@ from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
 from benchmarks.estimation.vehicles import SHIFT
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, build_objective, find_best, make_quick_plant
+from drivetwin.calibration.driven import DrivenShift, match_profiles
 from drivetwin.calibration.learn import correct_twin
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective
@@ -95,13 +96,14 @@ def learn_vehicle(made: MadeVehicle, effort: float) -> Trial:
     request, task = replace(request, limits=limits), task.set_limits(limits)
     weight = build_objective(task, make_quick_plant(task)).weight
     values = [_calibrate(made.twin, request, weight)]
-    logged: list[LoggedShift] = []
+    logged: list[DrivenShift] = []
     for number in range(1, ITERATIONS + 1):
         control = task.policy.build_control(values[-1])
         assert isinstance(control, Profiles)
         log = record_shift(made, task.maneuver, control, number)
         shifts = require_shifts(log, made.twin.build_card()).shifts
-        logged.append(LoggedShift(log, shifts[0]))
+        given = {str(number): control}
+        logged.append(match_profiles(LoggedShift(log, shifts[0]), given, task.maneuver))
         twin = correct_twin(made.twin, logged, request.spread).twin
         names = (one.name for one in task.policy.parameters)
         start = dict(zip(names, values[-1].tolist(), strict=True))

@@ -124,6 +124,7 @@ class Code(StrEnum):
     SIMULATION_ENDED_EARLY = auto()
     SIMULATION_DIVERGES = auto()
     OUTSIDE_IDENTIFIED_RANGE = auto()
+    LOG_FOLLOWS_NO_CALIBRATION = auto()
     ACTUATOR_ASSUMED = auto()
     ACTUATOR_FROM_TORQUE = auto()
     ACTUATOR_NOT_IDENTIFIED = auto()

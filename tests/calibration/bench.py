@@ -3,20 +3,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
+from drivetwin.calibration.input_path import DIRECT, InputPath
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
+from drivetwin.calibration.profiles import Profiles
 from drivetwin.channels.shiftlog import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.dyno.sensors import Sensor
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import TorqueError
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.simulation.driveline_run import DrivelineTask
-from drivetwin.simulation.dual_clutch import DualClutch
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 from tests.calibration.cases import SYSTEM, build_profiles
 
@@ -38,27 +39,22 @@ def write_bench_log(
     late: float = 0.0,
     seed: int = 1,
     parts: VehicleParts = NO_PARTS,
-) -> None:
+    way: InputPath = DIRECT,
+) -> Profiles:
     """Write the log of a power-on upshift of a driveline with the starting values of the policy.
 
-    Pressures act `late` [s] behind the logged ones.
+    Pressures act `late` [s] behind the logged ones, and all inputs by their `way`. Returns the
+    commanded profiles on the clock of the log.
     """
     shift = Maneuver(model, OperatingPoint(1400.0, 175.0), 0.5, request=1.5, horizon=4.0)
     space = Space(build_controller_policy(shift, SYSTEM))
     given = build_profiles(space, space.start)
     seen = list_sampling_instants(SENSORS, shift.horizon)
     pressures = {"B2": given.offgoing, "B3": given.oncoming}
-    acting = given.delay_pressures(late).sample(
-        1e-3 * np.arange(round(1e3 * shift.horizon) + 1, dtype=np.float64)
-    )
-    run = DrivelineTask(
-        model,
-        parts,
-        given.engine_torque,
-        {"B2": acting.offgoing, "B3": acting.oncoming},
-        shift.build_start(),
-        seen,
-    ).simulate()
+    late_way = replace(way, pressure_delay=late)
+    acting = late_way.apply(given.engine_torque, pressures, model.elements, shift.time)
+    torque = acting.pop(ENGINE_TORQUE)
+    run = DrivelineTask(model, parts, torque, acting, shift.build_start(), seen).simulate()
     inputs = {
         "engine_torque": given.engine_torque,
         **{f"pressure.{name}": one for name, one in pressures.items()},
@@ -66,3 +62,4 @@ def write_bench_log(
     motion = Motion(run, model.i_in, inputs, TorqueError())
     channels = record_channels(SENSORS, shift.horizon, motion, 1.0, seed)
     write_log(path, tuple(convert_to_recorded_units(one) for one in channels))
+    return given

@@ -13,6 +13,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration import evaluate
 from drivetwin.calibration.calibrate import Task, draw_for
 from drivetwin.calibration.identified_range import simulate_nominal
+from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome, list_outputs
 from drivetwin.calibration.policies.controller import build_controller_policy
@@ -62,7 +63,8 @@ def test_late_pressures_move_the_shift_by_their_delay() -> None:
     control = space.build_control(space.start)
     locks = []
     for delay in (0.0, 0.01):
-        plant, draws = make_plant(replace(shift, pressure_delay=delay)), make_draws(shift, 4)
+        late = replace(shift, path=InputPath(pressure_delay=delay))
+        plant, draws = make_plant(late), make_draws(shift, 4)
         locks.append(plant.simulate(control, draws, (shift.body.drive,)).last_lock)
     np.testing.assert_allclose(locks[1] - locks[0], 0.01, rtol=0.1)
 

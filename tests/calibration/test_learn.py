@@ -5,22 +5,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from drivetwin.calibration.driven import DrivenShift
 from drivetwin.calibration.learn import Correction, correct_twin
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.vehicle_unknowns import METHOD, build_unknowns
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import require_shifts
-from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
 from drivetwin.validation.simulate_log import LoggedShift
 from tests.calibration.bench import write_bench_log
 from tests.calibration.twins import PARTS, STD, add_part, make_twin
 
+REQUEST = 1.5
+"""Instant of the request in the logs [s]."""
 STRONG, TORQUE = 1.05, 1.02
 """Friction of the on-coming clutch and η of the vehicle, over those of the twin."""
 
@@ -31,23 +35,27 @@ def twin() -> Twin:
 
 
 @pytest.fixture(scope="module")
-def logged(twin: Twin, tmp_path_factory: pytest.TempPathFactory) -> LoggedShift:
+def driven(twin: Twin, tmp_path_factory: pytest.TempPathFactory) -> DrivenShift:
     model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
     old, new = model.elements
     model = replace(
         model, eta=TORQUE * model.eta, J1=model.J1 / TORQUE,
         elements=(old, replace(new, gain=STRONG * new.gain)),
     )  # fmt: skip
-    path = tmp_path_factory.mktemp("bench") / "bench.csv"
-    write_bench_log(path, model)
+    return drive(twin, tmp_path_factory.mktemp("bench") / "bench.csv", model)
+
+
+def drive(twin: Twin, path: Path, model: DualClutch, **bench: Any) -> DrivenShift:
+    """Write the log of a shift of `model` and read it with the profiles that were commanded."""
+    profiles = write_bench_log(path, model, **bench)
     log = read_log(path, twin.build_card())
     (shift,) = require_shifts(log, twin.build_card()).shifts
-    return LoggedShift(log, shift)
+    return DrivenShift(LoggedShift(log, shift), profiles, REQUEST)
 
 
 @pytest.fixture(scope="module")
-def found(twin: Twin, logged: LoggedShift) -> Correction:
-    return correct_twin(twin, [logged], Spread())
+def found(twin: Twin, driven: DrivenShift) -> Correction:
+    return correct_twin(twin, [driven], Spread())
 
 
 def test_a_correction_finds_the_friction_and_the_engine_torque_of_the_vehicle(
@@ -82,8 +90,8 @@ def test_inertias_of_both_gears_belong_to_one_engine_side(found: Correction) -> 
     assert engine[0] == pytest.approx(engine[1], rel=1e-12)
 
 
-def test_without_a_deviation_the_twin_stays(found: Correction, logged: LoggedShift) -> None:
-    again = correct_twin(found.twin, [logged], Spread()).twin
+def test_without_a_deviation_the_twin_stays(found: Correction, driven: DrivenShift) -> None:
+    again = correct_twin(found.twin, [driven], Spread()).twin
     for name in found.twin.covariance_ids:
         value, moved = (one.parameters[name] for one in (found.twin, again))
         assert value.value is not None
@@ -107,11 +115,8 @@ def test_the_spread_widens_the_prior(twin: Twin) -> None:
 
 def test_pressures_that_act_late_are_found(twin: Twin, tmp_path: Path) -> None:
     late, shift = 4e-3, build_nominal_shift(twin, ("2", "3"))
-    path = tmp_path / "bench.csv"
-    write_bench_log(path, twin.build_dual_clutch(shift), late)
-    log = read_log(path, twin.build_card())
-    logged = LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0])
-    delay = correct_twin(twin, [logged], Spread()).twin.parameters[PRESSURE_DELAY]
+    driven = drive(twin, tmp_path / "bench.csv", twin.build_dual_clutch(shift), late=late)
+    delay = correct_twin(twin, [driven], Spread()).twin.parameters[PRESSURE_DELAY]
     assert delay.value is not None
     assert delay.std_total is not None
     assert delay.std_total < 1e-3
@@ -125,12 +130,10 @@ def test_a_clutch_without_a_curve_gets_a_law_of_its_own(twin: Twin, tmp_path: Pa
     law = old.friction
     assert isinstance(law, Stribeck)
     other = replace(law, mu_c=0.95 * law.mu_c, mu_s=0.85 * law.mu_s)
-    path = tmp_path / "bench.csv"
-    write_bench_log(path, replace(model, elements=(replace(old, friction=other), new)))
-    log = read_log(path, twin.build_card())
-    logged = LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0])
+    vehicle = replace(model, elements=(replace(old, friction=other), new))
+    driven = drive(twin, tmp_path / "bench.csv", vehicle)
     borrowed = replace(twin, friction={"B3": twin.friction["B3"]})
-    found = correct_twin(borrowed, [logged], Spread())
+    found = correct_twin(borrowed, [driven], Spread())
     curve = found.twin.friction["B2"]
     assert curve.stribeck is not None
     assert curve.stribeck.mu_s == pytest.approx(other.mu_s, rel=0.02)
@@ -147,7 +150,10 @@ def test_a_second_log_narrows_the_values_of_a_distant_vehicle(twin: Twin, tmp_pa
         write_bench_log(path, other, seed=seed)
         log = read_log(path, twin.build_card())
         logged.append(LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0]))
-    once, twice = (correct_twin(twin, logged[:count], Spread()) for count in (1, 2))
+    once, twice = (
+        correct_twin(twin, [DrivenShift(one) for one in logged[:count]], Spread())
+        for count in (1, 2)
+    )
     for found in (once, twice):
         assert found.after["output_torque"] < 1.3 * 15.0
     stds = [one.twin.parameters["eta"].std_total for one in (once, twice)]
@@ -160,12 +166,9 @@ def test_the_part_of_the_vehicle_is_corrected_too(twin: Twin, tmp_path: Path) ->
     given = add_part(twin, PARTS["input shaft"])
     model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
     true = 1.02 * PARTS["input shaft"]["mode_frequency"]
-    path = tmp_path / "bench.csv"
     parts = given.build_parts(model, {"mode_frequency": true})
-    write_bench_log(path, model, parts=parts)
-    log = read_log(path, twin.build_card())
-    logged = LoggedShift(log, require_shifts(log, twin.build_card()).shifts[0])
-    found = correct_twin(given, [logged], Spread())
+    driven = drive(given, tmp_path / "bench.csv", model, parts=parts)
+    found = correct_twin(given, [driven], Spread())
     frequency = found.twin.parameters["mode_frequency"]
     assert found.twin.part_values.keys() == given.part_values.keys()
     assert frequency.value is not None

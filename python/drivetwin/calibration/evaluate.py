@@ -21,7 +21,6 @@ from drivetwin.calibration.metrics import (
 from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import BatchRequest, Keep
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE
 from drivetwin.simulation.network import Output
 from drivetwin.simulation.network_batch import NetworkScenario, to_core_scenarios
 from drivetwin.simulation.network_output import to_native
@@ -81,12 +80,12 @@ class Plant:
             return self._run_closed_loops([control], scenarios, outputs)[0]
         self.count.runs += scenarios.count
         shift = self.maneuver
-        sampled = control.delay_pressures(shift.pressure_delay).sample(shift.time)
-        inputs = {
-            ENGINE_TORQUE: sampled.engine_torque,
-            shift.offgoing.name: sampled.offgoing,
-            shift.oncoming.name: sampled.oncoming,
+        pressures = {
+            shift.offgoing.name: control.offgoing,
+            shift.oncoming.name: control.oncoming,
         }
+        elements = shift.model.elements
+        inputs = shift.path.apply(control.engine_torque, pressures, elements, shift.time)
         given = to_core_scenarios([NetworkScenario(inputs, shift.start)])
         native = to_native(shift.elements, outputs)
         # Checks of `simulate_network_batch` take a tenth of a run, and these elements are built.

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.input_path import DIRECT, InputPath
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline import (
     CRANK,
@@ -44,8 +45,8 @@ class Maneuver:
     """A shift of `model` from its first shift element to its second at an operating point.
 
     `wheel_radius` [m] converts the wheel's motion to the vehicle's. The gear is requested at
-    `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s]. Pressures act
-    later than they are given by `pressure_delay` [s]. `parts` are those beside the dual clutch.
+    `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s]. `path` leads from
+    profiles to the inputs that act. `parts` are those beside the dual clutch.
     """
 
     model: DualClutch
@@ -54,7 +55,7 @@ class Maneuver:
     request: float = 0.1
     horizon: float = 1.6
     step: float = 1e-3
-    pressure_delay: float = 0.0
+    path: InputPath = DIRECT
     parts: VehicleParts = NO_PARTS
 
     @cached_property

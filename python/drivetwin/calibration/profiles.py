@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,11 +35,6 @@ class Profiles:
             "pressure.offgoing": self.offgoing,
             "pressure.oncoming": self.oncoming,
         }
-
-    def delay_pressures(self, delay: float) -> Profiles:
-        """Return the profiles with pressures that act later by `delay` [s]."""
-        late = [replace(one, delay=one.delay + delay) for one in (self.offgoing, self.oncoming)]
-        return Profiles(self.engine_torque, *late)
 
     def sample(self, time: FloatArray) -> Profiles:
         """Return the profiles with corners at `time` (n,) [s] alone.

@@ -4,12 +4,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import field
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 
-from drivetwin.calibration.calibrate import Task, draw_for
+import numpy as np
+
+from drivetwin.calibration.calibrate import (
+    Task,
+    build_objective,
+    draw_for,
+    make_quick_plant,
+)
 from drivetwin.calibration.certificate import compute_quantiles
 from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
@@ -18,6 +26,7 @@ from drivetwin.calibration.options import CalibrationOptions
 from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.policy import Space
+from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
@@ -65,9 +74,8 @@ def build_task(twin: Twin, request: Request) -> Task:
     oil = build_oil_state(twin, request)
     model = oil.warm(twin.build_dual_clutch(shift))
     point = _choose_point(twin, request)
-    delay = twin.get_value(PRESSURE_DELAY, 0.0)
-    parts = twin.build_parts(model)
-    maneuver = Maneuver(model, point, request.wheel_radius, pressure_delay=delay, parts=parts)
+    parts, path = twin.build_parts(model), InputPath.from_twin(twin)
+    maneuver = Maneuver(model, point, request.wheel_radius, path=path, parts=parts)
     check_torque_phase_first(maneuver)
     units = None
     if request.policy.commands_actuators:
@@ -82,6 +90,39 @@ def build_task(twin: Twin, request: Request) -> Task:
     if request.limits is None:
         task = task.set_limits(derive_limits(task))
     return task
+
+
+def build_profiles(
+    twin: Twin, request: Request, values: Mapping[str, float]
+) -> tuple[Maneuver, Profiles | None]:
+    """Build the shift of a request and the profiles that policy values by name command in it.
+
+    None for a closed loop, whose commands follow from the slip of the vehicle. Raises as
+    `build_task`.
+    """
+    task = build_task(twin, replace(request, limits=()))
+    starts = {one.name: one.start for one in task.policy.parameters}
+    control = task.policy.build_control(np.array(list({**starts, **values}.values())))
+    return task.maneuver, control if isinstance(control, Profiles) else None
+
+
+def choose_start(twin: Twin, request: Request, starts: Sequence[Mapping[str, float]]) -> Request:
+    """Return a request that starts from the best of several calibrations by a corrected twin.
+
+    The limits are those of the last one, which the next calibration must not exceed.
+    """
+    last = replace(request, start=starts[-1])
+    if len(starts) == 1:
+        return last
+    task = build_task(twin, last)
+    plant, space = make_quick_plant(task), Space(task.policy)
+    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    policies = [task.policy.set_start(one) for one in starts]
+    controls = [space.build_control(Space(one).start) for one in policies]
+    objective = build_objective(task, plant)
+    values = [objective.evaluate(one) for one in plant.evaluate_all(controls, draws)]
+    best = starts[int(np.argmin(values))]
+    return replace(request, start=best, limits=task.limits)
 
 
 def require_identified(twin: Twin) -> None:

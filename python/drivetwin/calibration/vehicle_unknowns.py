@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +14,11 @@ from drivetwin.calibration.scenarios import TwinDraws
 from drivetwin.calibration.spread import Spread
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.linear.friction_points import build_law_derivatives
-from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
+from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.part_parameters import PROGRESSION, TYRE_SLIP
 from drivetwin.twin.distribution import collect_covariance, has_possible_parts
 from drivetwin.twin.friction_law import (
     build_partner_spread,
@@ -26,7 +27,7 @@ from drivetwin.twin.friction_law import (
     to_law,
     to_values,
 )
-from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
+from drivetwin.twin.twin import CAPACITY_SLOPE, PRESSURE_DELAY, SIMULATED, TORQUE_LAG, Twin
 from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
 from drivetwin.vehicle.effects import EffectId
 
@@ -106,6 +107,60 @@ METHOD = "logs of a calibration"
 """Name of the method in the estimates of a corrected twin."""
 _LEAST = 1e-12
 """Variance below which a direction of the prior is fixed, over the largest one."""
+_UNIT_STD = {"k_o": 0.03, "c_o": 0.2, "J_prime": 0.02, "J_vehicle": 0.02, "Tv_over_if": 0.05}
+"""Relative standard deviations between made units, by stem, of what `Spread` leaves out:
+engineering estimates (fuel and load of a vehicle; damping varies with oil and mounts)."""
+_LEAST_LAG = 2e-5
+"""Lag [s] that moves no signal by its noise."""
+_SLOPE_STD = 0.10
+"""Standard deviation of the change of μ over the pressure range of a shift; engineering estimate:
+2 to 5 % per MPa of a lining, and springs and seals of the piston."""
+
+
+@dataclass(frozen=True)
+class LearnedValue:
+    """Value of a parameter by id with its standard deviation, before and after the logs; SI."""
+
+    id: str
+    before: float
+    before_std: float
+    after: float
+    after_std: float
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+        return get_parameter_spec(self.id).unit
+
+    @property
+    def moved(self) -> float:
+        """Change in standard deviations before the logs."""
+        return (self.after - self.before) / self.before_std if self.before_std > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class AddedUnknown:
+    """Unknown that the twin's covariance does not contain: id, mean and standard deviation.
+
+    Its values start from `lower`.
+    """
+
+    id: str
+    mean: float
+    std: float
+    lower: float = -np.inf
+
+
+PARTS = {
+    TYRE_SLIP: AddedUnknown(TYRE_SLIP, 0.0, 0.005, 2e-4),
+    PROGRESSION: AddedUnknown(PROGRESSION, 0.0, 0.10),
+}
+"""Sizes of parts that logs can add to a twin, by id.
+
+Their standard deviations are the upper ends of typical ranges: a slip of 0.1 to 0.5 % at the
+traction of a shift, and rubber couplings that stiffen by a tenth. Less slip than the lower bound
+moves no signal by its noise.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +168,8 @@ class VehicleUnknowns:
     """Values (n,) of one vehicle: parameters `ids` of the twin, then those of the friction.
 
     `mean` and `root` (n, m) are those of the prior: values are mean + root·z with z of the standard
-    normal distribution. The prior is the total covariance of the twin together with the spread of
-    made units, of which the vehicle is one.
+    normal distribution, from `lower` (m,) on. The prior is the total covariance of the twin
+    together with the spread of made units, of which the vehicle is one.
     """
 
     twin: Twin
@@ -123,6 +178,12 @@ class VehicleUnknowns:
     friction: tuple[FrictionUnknowns, ...]
     mean: FloatArray
     root: FloatArray
+    lower: FloatArray
+
+    @property
+    def count(self) -> int:
+        """Number m of standardised values."""
+        return int(self.lower.size)
 
     def to_values(self, z: FloatArray) -> FloatArray:
         """Convert standardised values (m,) to values (n,)."""
@@ -170,6 +231,30 @@ class VehicleUnknowns:
             covariance=np.asarray(total[:count, :count]),
         )
 
+    def describe_values(self, z: FloatArray, covariance: FloatArray) -> tuple[LearnedValue, ...]:
+        """Describe standardised values (m,) with their covariance (m, m) beside those before.
+
+        The friction of an element is that at the middle slip of its curve.
+        """
+        none, prior = np.zeros(z.size), self.root @ self.root.T
+        total = self.root @ covariance @ self.root.T
+        stds = [np.sqrt(np.diag(one)) for one in (prior, total)]
+        pairs = zip(self.to_values(none), stds[0], self.to_values(z), stds[1], strict=True)
+        count = len(self.ids)
+        found = [
+            LearnedValue(name, *map(float, row))
+            for name, row in zip(self.ids, list(pairs)[:count], strict=True)
+        ]
+        for one, part in self._pair_friction():
+            row: list[float] = []
+            for values, spread in ((self.to_values(none), prior), (self.to_values(z), total)):
+                curve = one.build_curve(values[part], spread[part, part], METHOD)
+                middle = curve.slip.size // 2
+                mu = float(curve.mu[middle])
+                row += [mu, (float(curve.mu_hi[middle]) - mu) / Z95]
+            found.append(LearnedValue(f"mu.{one.element}", *row))
+        return tuple(found)
+
     def _pair_friction(self) -> Iterator[tuple[FrictionUnknowns, slice]]:
         """Pair the friction of each element with the place of its values."""
         first = len(self.ids)
@@ -202,13 +287,40 @@ class VehicleUnknowns:
         return found
 
 
-def build_unknowns(twin: Twin, shift: Shift, spread: Spread) -> VehicleUnknowns:
+def add_exact(twin: Twin, values: Mapping[str, float]) -> Twin:
+    """Return the twin with exact values of parameters by id."""
+    made = {
+        name: Estimate(name, value, 0.0, Verdict.DESIGN, METHOD) for name, value in values.items()
+    }
+    return replace(twin, parameters={**twin.parameters, **made})
+
+
+def list_added(twin: Twin, shift: Shift, *, commanded: bool) -> list[AddedUnknown]:
+    """List the unknowns of the path of the inputs.
+
+    The lag of the engine torque is one where shifts are simulated from what was `commanded`:
+    the age of a torque message cannot be told from it.
+    """
+    slope = f"{CAPACITY_SLOPE}.{shift.oncoming}"
+    found = [AddedUnknown(slope, twin.get_value(slope, 0.0), _SLOPE_STD)]
+    if commanded:
+        lag = twin.get_value(TORQUE_LAG, 0.0)
+        std = EFFECTS[EffectId.TORQUE_LAG].std
+        found.append(AddedUnknown(TORQUE_LAG, lag, std, _LEAST_LAG))
+    return found
+
+
+def build_unknowns(
+    twin: Twin, shift: Shift, spread: Spread, added: Sequence[AddedUnknown] = ()
+) -> VehicleUnknowns:
     """Build the values of a vehicle that a shift depends on, with their prior."""
     elements = (shift.offgoing, shift.oncoming)
     contacts = tuple(
         name for name in (f"P0.{one}" for one in elements) if twin.get_value(name, 0.0) > 0.0
     )
     drawn = TwinDraws(twin, shift, spread).drawn_ids
+    own_ids = {one.id for one in added}
+    drawn = [name for name in drawn if name not in own_ids]
     ids = (*drawn, *(name for name in (*contacts, PRESSURE_DELAY) if name not in drawn))
     friction = tuple(
         build_friction_unknowns(one, partner, twin.friction, spread.gain)
@@ -225,7 +337,26 @@ def build_unknowns(twin: Twin, shift: Shift, spread: Spread) -> VehicleUnknowns:
     variances, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
     kept = variances > _LEAST * variances[-1]
     root = scale[:, None] * axes[:, kept] * np.sqrt(variances[kept])
-    return VehicleUnknowns(twin, shift, ids, friction, mean, np.asarray(root))
+    return VehicleUnknowns(
+        twin,
+        shift,
+        (*ids, *(one.id for one in added)),
+        friction,
+        mean=np.insert(mean, len(ids), [one.mean for one in added]),
+        root=_insert_axes(np.asarray(root), len(ids), [one.std for one in added]),
+        lower=np.array(
+            [-np.inf] * root.shape[1] + [(one.lower - one.mean) / one.std for one in added]
+        ),
+    )
+
+
+def _insert_axes(root: FloatArray, place: int, stds: Sequence[float]) -> FloatArray:
+    """Insert rows of independent values at `place` of a root (n, m), with axes of their own."""
+    count, axes = len(stds), root.shape[1]
+    found = np.zeros((root.shape[0] + count, axes + count))
+    found[:place, :axes], found[place + count :, :axes] = root[:place], root[place:]
+    found[place : place + count, axes:] = np.diag(stds)
+    return found
 
 
 def _add_spread(covariance: FloatArray, mean: Mapping[str, float], spread: Spread) -> None:
@@ -237,6 +368,8 @@ def _add_spread(covariance: FloatArray, mean: Mapping[str, float], spread: Sprea
     for place, name in enumerate(mean):
         if name.removesuffix(OVER_ETA) == "eta":
             direction[place] = mean[name]
+        std = _UNIT_STD.get(get_parameter_spec(name).stem, 0.0)
+        covariance[place, place] += (std * mean[name]) ** 2
     covariance += spread.engine_torque**2 * np.outer(direction, direction)
     common = np.zeros(covariance.shape[0])
     common[[place for place, name in enumerate(mean) if name.startswith("P0.")]] = 1.0
@@ -245,5 +378,7 @@ def _add_spread(covariance: FloatArray, mean: Mapping[str, float], spread: Sprea
 
 def _change(before: Estimate | None, name: str, value: float, std: float) -> Estimate:
     if before is None:
-        return assess(name, value, std, METHOD)
+        made = assess(name, value, std, METHOD)
+        verdict = Verdict.WEAK if made.value is None else made.verdict
+        return replace(made, value=value, std_noise=std, verdict=verdict)
     return replace(before, value=value, std_noise=std, std_systematic=None, method=METHOD)

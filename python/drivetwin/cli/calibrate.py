@@ -21,6 +21,8 @@ from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.cli.arguments import RESULT, TWIN, TwinInput
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
+    list_log_findings,
+    load_starts,
     to_correction_document,
 )
 from drivetwin.cli.output import print_blocks, print_json, print_line, show_step, to_error_document
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from drivetwin.calibration.twin_task import Request
     from drivetwin.files.stages_file import StagesFile
     from drivetwin.findings import Finding
+    from drivetwin.report.blocks import Block
     from drivetwin.twin.twin import Twin
 
     Results = tuple[Calibration, Front | None, OperatingMap | None]
@@ -65,7 +68,11 @@ class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
     controller: Path | None = input_file(
         "Parameter file of your own controller in C; the policy is then own."
     )
-    start: Path | None = input_file("Earlier calibration.toml as the start.")
+    start: tuple[Path, ...] = input_file(
+        "Earlier calibration.toml as the start (may be repeated with --from-logs: each calibration "
+        "that a log was driven with, the last one last).",
+        default=(),
+    )
     effort: float = option(
         "Factor on the length of the search.", minimum=0.05, maximum=20.0, default=1.0
     )
@@ -99,7 +106,8 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
     Where a limit is out of reach, the best calibration found is written and the exit code is 2.
     """
     from drivetwin.calibration.identified_range import check_identified_range
-    from drivetwin.report.calibration import build_calibration_blocks, build_correction_table
+    from drivetwin.report.calibration import build_calibration_blocks
+    from drivetwin.report.correction import build_correction_blocks
 
     if request.controller is not None:
         request = replace(request, policy=PolicyKind.OWN)
@@ -112,19 +120,21 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
         results = _calibrate(model, task, (request.grid, request.front), stages)
         found = results[0]
         findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
+        findings = (*list_log_findings(correction), *findings)
+        learned = None if correction is None else build_correction_blocks(correction, found)
         with show_step(f"writing {output}"):
-            _write_results(request, results, findings, (model, task))
+            _write_results(request, results, (findings, learned or []), (model, task))
     stages.remove()
     infeasible = _find_excess(found, output)
     if as_json:
         fault = {} if infeasible is None else to_error_document(infeasible)
-        learned = to_correction_document(correction)
-        print_json({**_to_document(results, findings, output), **learned, **fault})
+        document = _to_document(results, findings, output)
+        print_json({**document, **to_correction_document(correction), **fault})
         if infeasible is not None:
             raise typer.Exit(infeasible.exit_code)
         return
-    if correction is not None:
-        print_blocks([build_correction_table(correction)])
+    if learned is not None:
+        print_blocks(learned)
     print_blocks(build_calibration_blocks(found, findings, *results[1:]))
     print_line(f"wrote {output / REPORT}")
     if infeasible is not None:
@@ -173,13 +183,12 @@ def _build_request(
 ) -> tuple[Request, Correction | None]:
     """Build the task from options and files; correct the twin by logs if there are any."""
     from drivetwin.calibration.settings import CalibrationSettings
-    from drivetwin.calibration.twin_task import Request
+    from drivetwin.calibration.twin_task import Request, choose_start
     from drivetwin.cli.export import parse_gears
     from drivetwin.files.limits_file import Requirements, load_limits
 
     given = Requirements(()) if request.limits is None else load_limits(request.limits)
     gears, logs = parse_gears(request.shift), request.from_logs
-    correction = correct_by_logs(twin, logs, gears, given.spread) if logs else None
     settings = CalibrationSettings(certificate_draws=request.draws).scale_effort(request.effort)
     task = Request(
         **request.select(CalibrationOptions),
@@ -189,10 +198,20 @@ def _build_request(
         spread=given.spread,
         oil=given.oil,
         bounds=given.bounds,
-        start=_load_start(request.start, request.policy),
         settings=replace(settings, starts=0) if logs and request.start else settings,
     )
-    return task, correction
+    starts = load_starts(request.start, request.policy)
+    if len(starts) > 1 and not logs:
+        raise InputError(
+            f"{len(starts)} starts are given without a log",
+            "give one --start, or the logs that were driven with them (--from-logs)",
+        )
+    if not logs:
+        return replace(task, start=dict(starts[0].values) if starts else {}), None
+    correction = correct_by_logs(twin, logs, task, starts)
+    if not starts:
+        return task, correction
+    return choose_start(correction.twin, task, [one.values for one in starts]), correction
 
 
 def _open_stages(request: Calibrate) -> StagesFile:
@@ -323,25 +342,10 @@ def _load_valid_twin(source: Path) -> Twin:
     return model
 
 
-def _load_start(path: Path | None, policy: PolicyKind) -> dict[str, float]:
-    if path is None:
-        return {}
-    from drivetwin.files.calibration_file import read_calibration_file
-
-    content = read_calibration_file(path)
-    if content.policy is not policy:
-        raise InputError(
-            f"the calibration has the policy {content.policy.value!r}, not {policy.value!r}",
-            f"start from another file, or add --policy {content.policy.value}",
-            Where(file=str(path)),
-        )
-    return {name: one.value for name, one in content.parameters.items()}
-
-
 def _write_results(
     request: Calibrate,
     results: Results,
-    findings: tuple[Finding, ...],
+    shown: tuple[tuple[Finding, ...], list[Block]],
     origin: tuple[Twin, Request],
 ) -> None:
     from drivetwin._util.atomic import write_text
@@ -387,7 +391,7 @@ def _write_results(
             if form is not None:
                 require_labels(content, form, kind)
             write_parameters(content, folder / f"calibration.{kind.value}", kind)
-        page = render_calibration(found, f"Calibration of {name}", findings, front, mapped)
+        page = render_calibration(found, f"Calibration of {name}", shown, front, mapped)
         write_text(folder / REPORT, page)
         if len(sources) > 1:
             save_twin(folder / TWIN, twin)

@@ -10,7 +10,6 @@ from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
 from drivetwin.calibration.front import Front
-from drivetwin.calibration.learn import Correction
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import MapPoint, OperatingMap
@@ -52,11 +51,15 @@ _TONES = {
 def render_calibration(
     found: Calibration,
     title: str,
-    findings: Sequence[Finding],
+    shown: tuple[Sequence[Finding], Sequence[Block]],
     front: Front | None = None,
     mapped: OperatingMap | None = None,
 ) -> str:
-    """HTML text of the page, with front and map; equal calibrations give equal text."""
+    """HTML text of the page, with front and map; equal calibrations give equal text.
+
+    `shown` are the findings, and the blocks of a correction by logs, empty without one.
+    """
+    findings, learned = shown
     draws = found.after.certificate.draws
     point = found.task.maneuver.point
     subtitle = (
@@ -67,6 +70,8 @@ def render_calibration(
         subtitle += f" · oil at {celsius:.0f} °C"
     around = [build_front_section(front), build_map_section(mapped)]
     sections = _build_sections(found, findings)
+    if learned:
+        around.insert(0, Section("logs", "Learned from logs", "", learned))
     sections[1:1] = [one for one in around if one.blocks]
     return render_page(title, subtitle, sections)
 
@@ -150,19 +155,6 @@ def build_calibration_blocks(
         *tables,
         *build_findings_section(findings).blocks,
     ]
-
-
-def build_correction_table(found: Correction) -> TableBlock:
-    """Deviations of logged shifts from the simulation before and after a correction of the twin."""
-    rows = []
-    for name, before in found.before.items():
-        unit = "N·m" if name.endswith("torque") else "rad/s"
-        rows.append((name, unit, before, found.after[name]))
-    return make_table(
-        "Logged shifts: RMS deviation of the simulation",
-        ("signal", "unit", ("before", ".3g"), ("after", ".3g")),
-        rows,
-    )
 
 
 def _build_limits(found: Calibration) -> TableBlock:
