@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: MIT
 """Calibrations that learn from the logs of their own shifts, compared with the true optimum.
 
-    python -m benchmarks.calibrate.from_logs [COUNT] [--first SEED] [--effort FACTOR]
+    python -m benchmarks.calibrate.from_logs [COUNT] [--first SEED] [--effort FACTOR] [--units N]
 
-Each made vehicle departs from the model by one effect; its log has noise and errors of the sensors.
-The log is identified and a shift calibrated on the twin. Then five times: the true vehicle makes
-the shift, its log corrects the twin, and the shift is calibrated again from the last result. The
-bench follows torque and pressures by the sensors of the log. The objective is that of the
-calibration (tail mean of peak jerk, with the penalty of the shift time), over units made around the
-true vehicle. Its optimum is the least of all these results and of a polish on true units from the
-best of them. Units that slip again after their lock-up are counted beside it: one of 240 is below
-what the draws of a calibration can see. Wanted: after five iterations within 5 % above the optimum
-in at least 50 of 60 vehicles.
+Each made vehicle is in the model or departs from it by one effect of usual size; its log has noise
+and errors of the sensors. The log is identified, and a robust shift calibrated on the twin. Then
+five times: the true vehicle makes the shift, its log corrects the twin together with all logs
+before it, and the shift is calibrated again from the best of all calibrations by the corrected
+twin. Where the twin is refused because it does not explain the logs, the calibration stays. The
+bench follows torque and pressures by the sensors of the log.
+
+The objective is that of the calibration (tail mean of peak jerk, with the penalty of the shift
+time), over the same fresh units made around the true vehicle for robust start, results and optimum.
+The optimum is the least of all results and of three polishes on other true units. Units that slip
+again after their lock-up are counted beside it. A vehicle whose twin is refused is replaced by the
+one of the next free seed.
+
+Wanted of 20 vehicles after five shifts: at most 5 % above the optimum in 16, at most 12 % in 19,
+none more than 3 % above its robust start.
 """
 
 from __future__ import annotations
@@ -30,7 +36,7 @@ from benchmarks.estimation.vehicles import SHIFT
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, build_objective, find_best, make_quick_plant
 from drivetwin.calibration.driven import DrivenShift, match_profiles
-from drivetwin.calibration.learn import correct_twin
+from drivetwin.calibration.learn import correct_twin, require_explained
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective
 from drivetwin.calibration.policy import Space
@@ -38,18 +44,29 @@ from drivetwin.calibration.polish import polish
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.twin_task import Request, build_task
-from drivetwin.errors import DrivetwinError
+from drivetwin.calibration.twin_task import Request, build_task, choose_start
+from drivetwin.errors import DrivetwinError, IdentificationError
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import LoggedShift
+from drivetwin.vehicle.effects import EffectId
 
-ITERATIONS = 5
-_SHARE, _EXCESS = 50 / 60, 0.05
-_POLISHED, _FRESH = 64, 240
-"""True units of the polish of the optimum, and of the comparison."""
-_ITERATIONS = 6
-"""Linear programs of the polish of the optimum."""
+SHIFTS, COUNT = 5, 20
+TURNS = (
+    None,
+    EffectId.TORQUE_LAG,
+    EffectId.PRESSURE_DELAY,
+    EffectId.TYRE_SLIP,
+    EffectId.FRICTION_PRESSURE,
+    EffectId.PROGRESSIVE_SHAFT,
+)
+"""Effects that take turns; None is a vehicle that is in the model."""
+_WANTED = {0.05: 16, 0.12: 19}
+"""Number of vehicles that are wanted by their excess over the optimum."""
+_WORSE = 0.03
+"""Excess over the robust start that no vehicle may have."""
+_POLISHED, _POLISHES, _ITERATIONS = 128, 3, 6
+"""True units, number and linear programs of the polishes of the optimum."""
 _LIGHT = CalibrationSettings(
     polish_draws=128,
     tail_draws=512,
@@ -73,43 +90,59 @@ _WARM = replace(_LIGHT, starts=0, polish_draws=64, polish_iterations=4, tail_ite
 
 @dataclass(frozen=True)
 class Trial:
-    """Objective [m/s^3] on true units: first calibration and after each log, and the optimum.
+    """Objective [m/s^3] on true units: robust start and after each log, and the optimum.
 
-    `relocked` counts the true units that slip again after lock-up with the last calibration.
+    `relocked` counts the true units that slip again after lock-up with the last calibration,
+    `refused` the shifts whose logs the corrected twin did not explain.
     """
 
     learned: tuple[float, ...]
     optimum: float
     relocked: int
+    refused: int
 
     @property
     def excess(self) -> float:
         """Objective after the last log, relative to the optimum."""
         return self.learned[-1] / self.optimum - 1.0
 
+    @property
+    def worse(self) -> float:
+        """Objective after the last log, relative to the robust start."""
+        return self.learned[-1] / self.learned[0] - 1.0
 
-def learn_vehicle(made: MadeVehicle, effort: float) -> Trial:
+
+def learn_vehicle(made: MadeVehicle, given: argparse.Namespace) -> Trial:
     """Calibrate one vehicle from its logs, and find the optimum on its true units."""
-    request = _build_request(made, effort)
+    request = _build_request(made, given.effort)
     task = build_task(made.twin, request)
     limits = tuple(one for one in task.limits if one.metric is Metric.SHIFT_TIME)
     request, task = replace(request, limits=limits), task.set_limits(limits)
     weight = build_objective(task, make_quick_plant(task)).weight
-    values = [_calibrate(made.twin, request, weight)]
-    logged: list[DrivenShift] = []
-    for number in range(1, ITERATIONS + 1):
-        control = task.policy.build_control(values[-1])
-        assert isinstance(control, Profiles)
-        log = record_shift(made, task.maneuver, control, number)
-        shifts = require_shifts(log, made.twin.build_card()).shifts
-        given = {str(number): control}
-        logged.append(match_profiles(LoggedShift(log, shifts[0]), given, task.maneuver))
-        twin = correct_twin(made.twin, logged, request.spread).twin
-        names = (one.name for one in task.policy.parameters)
-        start = dict(zip(names, values[-1].tolist(), strict=True))
-        warm = replace(request, start=start, settings=_WARM)
-        values.append(_calibrate(twin, warm, weight))
-    return _compare(made, task, values, weight)
+    values, driven, refused = [_calibrate(made.twin, request, weight)], list[DrivenShift](), 0
+    for number in range(1, SHIFTS + 1):
+        driven.append(_drive(made, task, values[-1], number))
+        try:
+            found = correct_twin(made.twin, driven, request.spread, made.seed)
+            require_explained(found)
+        except IdentificationError as error:
+            refused += 1
+            sys.stdout.write(f"vehicle {made.seed}, shift {number}: {error.what}\n")
+            values.append(values[-1])
+            continue
+        starts = [task.policy.name_values(one) for one in values]
+        warm = choose_start(found.twin, replace(request, settings=_WARM), starts)
+        values.append(_calibrate(found.twin, warm, weight))
+    return _compare(made, task, (values, weight, refused), given.units)
+
+
+def _drive(made: MadeVehicle, task: Task, values: FloatArray, number: int) -> DrivenShift:
+    """Drive a shift of the true vehicle and read its log."""
+    control = task.policy.build_control(values)
+    assert isinstance(control, Profiles)
+    log = record_shift(made, task.maneuver, control, number)
+    shifts = require_shifts(log, made.twin.build_card()).shifts
+    return match_profiles(LoggedShift(log, shifts[0]), {str(number): control}, task.maneuver)
 
 
 def _calibrate(twin: Twin, request: Request, weight: float) -> FloatArray:
@@ -121,26 +154,29 @@ def _calibrate(twin: Twin, request: Request, weight: float) -> FloatArray:
     return Space(task.policy).to_values(find_best(task, plant))
 
 
-def _compare(made: MadeVehicle, task: Task, values: Sequence[FloatArray], weight: float) -> Trial:
+def _compare(
+    made: MadeVehicle, task: Task, found: tuple[Sequence[FloatArray], float, int], units: int
+) -> Trial:
     """Compare calibrations with the optimum on fresh true units."""
-    space = Space(task.policy)
+    space, (values, weight, refused) = Space(task.policy), found
     polished, fresh = (
         draw_true_units(made, task.maneuver, Spread(), count, seed)
-        for seed, count in enumerate((_POLISHED, _FRESH))
+        for seed, count in enumerate((_POLISHED, units))
     )
     objective = Objective(task.limits, task.settings.search_share, weight)
     outcomes = [fresh.evaluate(task.policy.build_control(one)) for one in values]
     reached = [_assess(objective, one) for one in outcomes]
-    best = polish(
-        lambda tried: polished.evaluate_all([space.build_control(one) for one in tried]),
-        space.to_coordinates(values[int(np.argmin(reached))]),
-        objective,
-        _ITERATIONS,
-    )
-    found = fresh.evaluate(space.build_control(best.coordinates))
-    optimum = min(*reached, _assess(objective, found))
+    best = []
+    for place in np.argsort(reached, kind="stable")[:_POLISHES]:
+        one = polish(
+            lambda tried: polished.evaluate_all([space.build_control(each) for each in tried]),
+            space.to_coordinates(values[place]),
+            objective,
+            _ITERATIONS,
+        )
+        best.append(_assess(objective, fresh.evaluate(space.build_control(one.coordinates))))
     relocked = int(outcomes[-1].relocked.sum())
-    return Trial(tuple(reached), optimum, relocked)
+    return Trial(tuple(reached), min(*reached, *best), relocked, refused)
 
 
 def _assess(objective: Objective, outcome: Outcome) -> float:
@@ -160,16 +196,17 @@ def _build_request(made: MadeVehicle, effort: float) -> Request:
     )
 
 
-def try_vehicle(seed: int, effort: float) -> Trial:
+def try_vehicle(seed: int, given: argparse.Namespace) -> Trial:
     """Learn on one vehicle; print a line."""
     begin = time.process_time()
-    made = make_vehicle(seed)
-    trial = learn_vehicle(made, effort)
-    effects = ", ".join(f"{name} {size:.3g}" for name, size in made.effects.items())
+    made = make_vehicle(seed, parts=True, turns=TURNS)
+    trial = learn_vehicle(made, given)
+    effects = ", ".join(f"{name} {size:.3g}" for name, size in made.effects.items()) or "none"
     learned = " ".join(f"{one:.1f}" for one in trial.learned)
     sys.stdout.write(
         f"vehicle {seed} ({effects}): {learned}, optimum {trial.optimum:.1f} m/s3, "
-        f"{100.0 * trial.excess:.1f} % above, {trial.relocked} of {_FRESH} slip again; "
+        f"{100.0 * trial.excess:.1f} % above, {100.0 * trial.worse:+.1f} % to the robust start, "
+        f"{trial.refused} refused, {trial.relocked} of {given.units} slip again; "
         f"{time.process_time() - begin:.0f} s of CPU\n"
     )
     sys.stdout.flush()
@@ -177,25 +214,32 @@ def try_vehicle(seed: int, effort: float) -> Trial:
 
 
 def main() -> int:
-    """Try the vehicles; 1 where the bound is missed."""
+    """Try the vehicles; 1 where a bound is missed."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("count", type=int, nargs="?", default=60)
+    parser.add_argument("count", type=int, nargs="?", default=COUNT)
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--effort", type=float, default=1.0, help="length of the search")
+    parser.add_argument("--units", type=int, default=1000, help="fresh units of a vehicle")
     given = parser.parse_args()
-    trials = []
-    for seed in range(given.first, given.first + given.count):
+    trials: list[Trial] = []
+    seed, replaced = given.first, 0
+    while len(trials) < given.count and replaced <= given.count:
         try:
-            trials.append(try_vehicle(seed, given.effort))
+            trials.append(try_vehicle(seed, given))
         except DrivetwinError as error:
+            replaced += 1
             sys.stdout.write(f"vehicle {seed}: {error.what}\n")
-    near = sum(one.excess <= _EXCESS for one in trials)
-    first = sum(one.learned[0] <= (1.0 + _EXCESS) * one.optimum for one in trials)
+            sys.stdout.flush()
+        seed += 1
+    near = {bound: sum(one.excess <= bound for one in trials) for bound in _WANTED}
+    worse = sum(one.worse > _WORSE for one in trials)
+    counts = ", ".join(f"{count} within {100.0 * bound:.0f} %" for bound, count in near.items())
     sys.stdout.write(
-        f"within 5 % of the optimum: {near} of {given.count} vehicles after {ITERATIONS} logs, "
-        f"{first} before; {given.count - len(trials)} without calibration\n"
+        f"of {len(trials)} vehicles after {SHIFTS} shifts {counts} of the optimum; {worse} worse "
+        f"than the robust start by more than {100.0 * _WORSE:.0f} %; {replaced} replaced\n"
     )
-    return 0 if near >= _SHARE * given.count else 1
+    enough = all(near[bound] >= wanted for bound, wanted in _WANTED.items())
+    return 0 if enough and not worse else 1
 
 
 if __name__ == "__main__":

@@ -12,10 +12,12 @@ import numpy as np
 
 from benchmarks.calibrate.true_vehicle import MadeVehicle
 from benchmarks.estimation.vehicles import draw_errors, misread_channels
-from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.metrics import Metric, Outcome, Runs, compute_metrics
+from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.input_path import DIRECT
+from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
+from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.profiles import Control, Profiles
-from drivetwin.calibration.scenarios import scale_units
+from drivetwin.calibration.scenarios import collect_scenarios, scale_units
 from drivetwin.calibration.spread import Spread
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.shiftlog import ShiftLog
@@ -26,6 +28,7 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
 )
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
+from drivetwin.simulation.driveline import Driveline
 from drivetwin.simulation.dual_clutch import Signal
 
 _BEFORE, _AFTER = 1.5, 1.0
@@ -46,24 +49,21 @@ class TrueUnits:
         return [self.evaluate(one) for one in controls]
 
     def evaluate(self, control: Control) -> Outcome:
-        """Return the metrics of profiles over all units."""
+        """Return the metrics of profiles over all units, which run side by side."""
         assert isinstance(control, Profiles)
-        shift, names = self.shift, (self.shift.offgoing.name, self.shift.oncoming.name)
-        true = follow_profiles(self.made, shift, control)
+        shift, parts = self.shift, self.units[0].parts
+        names = (shift.offgoing.name, shift.oncoming.name)
+        true = follow_profiles(self.made, shift, control).sample(shift.time)
         pressures = dict(zip(names, (true.offgoing, true.oncoming), strict=True))
         acting = self.made.build_acting(true.engine_torque, pressures)
-        start = shift.build_start()
-        runs, locks = [], []
-        for unit in self.units:
-            run = replace(unit, **acting).simulate(start, shift.time)
-            pairs = [one[name] for name in names for one in (run.clutch_torque, run.slip)]
-            runs.append(np.stack([run.shaft_torque, *pairs]))
-            held = [
-                one.time for one in run.events if one.kind == "lock" and one.element == names[1]
-            ]
-            locks.append(held[-1] if held else float("nan"))
-        vehicle = np.full(len(runs), shift.model.J_v)
-        return compute_metrics(shift, Runs(np.stack(runs), np.array(locks)), vehicle, _METRICS)
+        torque = acting["engine_torque"]
+        driving = float(torque.values[0]) - parts.input_drag
+        point = OperatingPoint(driving, shift.point.engine_speed)
+        own = replace(shift, model=self.units[0].model, point=point, parts=parts, path=DIRECT)
+        drivelines = [Driveline(one.model, one.parts) for one in self.units]
+        profiles = Profiles(torque, *(acting["pressures"][name] for name in names))
+        plant = Plant(own, threads=1, metrics=_METRICS)
+        return plant.evaluate(profiles, collect_scenarios(own, drivelines))
 
 
 def draw_true_units(
@@ -110,9 +110,9 @@ def record_shift(made: MadeVehicle, shift: Maneuver, control: Profiles, seed: in
     duration = _BEFORE + shift.horizon + _AFTER
     followed = follow_profiles(made, shift, control)
     inputs = {
-        "engine_torque": _move(followed.engine_torque, duration),
-        f"pressure.{shift.offgoing.name}": _move(followed.offgoing, duration),
-        f"pressure.{shift.oncoming.name}": _move(followed.oncoming, duration),
+        "engine_torque": _move(followed.engine_torque, duration, shift.step),
+        f"pressure.{shift.offgoing.name}": _move(followed.offgoing, duration, shift.step),
+        f"pressure.{shift.oncoming.name}": _move(followed.oncoming, duration, shift.step),
     }
     pressures = {one.name: inputs[f"pressure.{one.name}"] for one in true.model.elements}
     seen = list_sampling_instants(sensors, duration)
@@ -128,8 +128,10 @@ def record_shift(made: MadeVehicle, shift: Maneuver, control: Profiles, seed: in
         return read_log(path, made.twin.build_card())
 
 
-def _move(signal: Signal, duration: float) -> Signal:
-    """Move a signal to the request of a log, constant beyond its ends."""
-    time = np.concatenate([[0.0], signal.time + _BEFORE, [duration + 1.0]])
-    values = np.concatenate([signal.values[:1], signal.values, signal.values[-1:]])
-    return Signal(time, values)
+def _move(signal: Signal, duration: float, step: float) -> Signal:
+    """Move a signal to the request of a log, constant beyond its ends.
+
+    It is sampled evenly: lags act on samples, and friction over pressure bends what is between.
+    """
+    time = step * np.arange(round((duration + 1.0) / step) + 1, dtype=np.float64)
+    return Signal(time, np.interp(time, signal.arrival + _BEFORE, signal.values))

@@ -9,7 +9,7 @@ the start to that task, with the pressures of the true actuators.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -141,15 +141,22 @@ class MadeVehicle:
         return {"engine_torque": found.engine_torque, "pressures": found.pressures}
 
 
-def make_vehicle(seed: int, *, whole: bool = True, parts: bool = False) -> MadeVehicle:
+def make_vehicle(
+    seed: int,
+    *,
+    whole: bool = True,
+    parts: bool = False,
+    turns: Sequence[EffectId | None] = EFFECTS,
+) -> MadeVehicle:
     """Make the vehicle of `seed`, its log and the twin; without `whole` it has no effect.
 
-    The twin has parts beside the dual clutch only with `parts`.
+    The effect is that of `turns` whose turn it is. The twin has parts beside the dual clutch only
+    with `parts`.
     """
     drawn = draw_vehicle(seed)
     scenario = add_hydraulics(drawn.scenario, np.random.default_rng([seed, 41]))
-    effect = EFFECTS[seed % len(EFFECTS)]
-    effects = {effect: draw_size(seed, effect, 1.0)} if whole else {}
+    effect = turns[seed % len(turns)] if whole else None
+    effects = {} if effect is None else {effect: draw_size(seed, effect, 1.0)}
     recorded = misread(run(scenario, seed, effects=effects), seed)
     twin = _identify(replace(drawn, card=add_tolerances(drawn.card, scenario)), recorded)
     twin = twin if parts else twin.drop_part()

@@ -91,8 +91,7 @@ class Plant:
         # Checks of `simulate_network_batch` take a tenth of a run, and these elements are built.
         asked = BatchRequest.build(given, shift.time, scenarios.sets, native, Keep.COLUMNS)
         batch = asked.simulate(as_json(shift.elements), asked.sets, self.threads)
-        pressures = (sampled.offgoing.values, sampled.oncoming.values)
-        seen = np.stack([sampled.engine_torque.values, *pressures])[None]
+        seen = np.stack([np.asarray(one.values) for one in inputs.values()])[None]
         return Runs(batch.values, batch.last_lock, seen)
 
     def _run_closed_loops(
