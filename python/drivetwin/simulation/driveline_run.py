@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from drivetwin._util.arrays import FloatArray
@@ -73,14 +73,15 @@ class DrivelineTask:
 
         Raises InputError where the description is inconsistent.
         """
-        run = simulate_network(
-            build_driveline(self.model, self.parts),
-            self.inputs,
-            self._build_start(),
-            self.time,
-            self._list_outputs(),
-        )
-        return build_trajectory(run, self.names)
+        return build_trajectory(self.record(self._list_outputs()), self.names)
+
+    def record(self, outputs: Sequence[Output]) -> NetworkRun:
+        """Simulate and record `outputs`; a failed run returns its status.
+
+        Raises InputError where the description is inconsistent.
+        """
+        elements = build_driveline(self.model, self.parts)
+        return simulate_network(elements, self.inputs, self._build_start(), self.time, outputs)
 
     def differentiate(self, count: int) -> tuple[Trajectory, Mapping[Output, FloatArray]]:
         """Simulate, and differentiate by the `count` unknowns of the variables in the task.

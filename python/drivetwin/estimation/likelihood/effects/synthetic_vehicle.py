@@ -160,6 +160,10 @@ class SyntheticVehicle:
         Of `start` the speeds and the locked element hold, the rest is that of quasi-steady
         acceleration. Raises InputError where the description is inconsistent.
         """
+        return self.build_task(start, time).simulate()
+
+    def build_task(self, start: State, time: FloatArray) -> DrivelineTask:
+        """Build the run of `simulate`."""
         settled = settle(self.model, self.parts, start, self.engine_torque, float(time[0]))
         given = (self.engine_torque, self.pressures, settled, time)
-        return DrivelineTask(self.model, self.parts, *given).simulate()
+        return DrivelineTask(self.model, self.parts, *given)
