@@ -73,6 +73,19 @@ def make_downshift() -> Maneuver:
     return Maneuver(model, OperatingPoint(-150.0, 120.0), 0.5)
 
 
+def make_power_on_downshift() -> Maneuver:
+    """Power-on downshift 3-2 of the same truck."""
+    model = build_model(make_problem())
+    old, new = model.elements
+    return Maneuver(replace(model, elements=(new, old)), OperatingPoint(900.0, 120.0), 0.5)
+
+
+def make_power_off_upshift() -> Maneuver:
+    """Power-off upshift 2-3 of the same truck on a slope."""
+    model = replace(build_model(make_problem()), load=RoadLoad(constant=-2000.0))
+    return Maneuver(model, OperatingPoint(-150.0, 170.0), 0.5)
+
+
 def make_draw(maneuver: Maneuver, spread: Spread | None = None) -> Draw:
     """Made units around the driveline of a shift."""
     return Draw(KnownDraws(maneuver.model, spread or Spread()))

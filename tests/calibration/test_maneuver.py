@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
+from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_gears
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline import ENGINE, SHAFT
@@ -58,11 +58,25 @@ def test_direction_is_that_of_the_engine_speed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("shift", "torque"),
-    [(make_upshift(), -100.0), (make_upshift(), 0.0), (make_downshift(), 300.0)],
+    ("shift", "torque", "first"),
+    [
+        (make_upshift(), -100.0, True),
+        (make_upshift(), 0.0, False),
+        (make_upshift(), 100.0, False),
+        (make_downshift(), 300.0, True),
+        (make_downshift(), -300.0, False),
+    ],
 )
-def test_other_kinds_are_refused(shift: Maneuver, torque: float) -> None:
-    check_torque_phase_first(shift)
-    other = replace(shift, point=OperatingPoint(torque, shift.point.engine_speed))
-    with pytest.raises(InputError, match="cannot be calibrated"):
-        check_torque_phase_first(other)
+def test_the_engine_moves_by_itself_where_its_torque_has_the_direction(
+    shift: Maneuver, torque: float, first: bool
+) -> None:
+    point = OperatingPoint(torque, shift.point.engine_speed)
+    assert replace(shift, point=point).inertia_first is first
+
+
+def test_equal_gears_are_refused() -> None:
+    shift = make_upshift()
+    old, _ = shift.model.elements
+    same = replace(shift.model, elements=(old, replace(old, name="other")))
+    with pytest.raises(InputError, match="same overall ratio"):
+        check_gears(replace(shift, model=same))

@@ -13,15 +13,14 @@ from drivetwin.calibration.calibrate import Task, calibrate
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import METRICS, Metric, Outcome, Runs, compute_metrics
 from drivetwin.calibration.objective import Limit
-from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.policies.knots import build_knot_policy
-from drivetwin.calibration.policy import Policy, Space
+from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Draw, Scenarios, collect_scenarios
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.simulation.driveline import Driveline
+from drivetwin.simulation.shift_control import ControlledUnit
 from tests.calibration.cases import (
     ACTUATOR,
     QUICK,
@@ -71,19 +70,18 @@ CASES = {
     "upshift by knots": Case(make_problem(), 1400.0, PolicyKind.KNOTS),
     "upshift by a slip loop": Case(make_problem(), 1400.0, PolicyKind.SLIP),
     "downshift": Case(make_downshift(), -150.0, PolicyKind.CONTROLLER),
+    "downshift with the power on": Case(
+        replace(make_downshift(), T_v=make_problem().T_v), 900.0, PolicyKind.CONTROLLER
+    ),
 }
 
 
 def build_task(case: Case) -> Task:
     """Return a short calibration with a limit of the shift time."""
     shift, draw = case.shift, make_draw(case.shift)
-    controller = build_controller_policy(shift, SYSTEM)
-    policy: Policy = controller
-    if case.kind is PolicyKind.KNOTS:
-        space = Space(controller)
-        start = controller.build_control(space.to_values(space.start))
-        policy = build_knot_policy(shift, start, SYSTEM)
-    elif case.kind is PolicyKind.SLIP:
+    unit = ControlledUnit(ACTUATOR.model, ACTUATOR.model, LAG)
+    policy = POLICIES[case.kind](PolicySetup(shift, SYSTEM, unit, 0.01))
+    if case.kind is PolicyKind.SLIP:
         policy = make_slip_policy(shift)
         draw = Draw(draw.driveline, UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread()))
     return Task(shift, policy, draw, (Limit(Metric.SHIFT_TIME, 1.0),), 1, SHORT)

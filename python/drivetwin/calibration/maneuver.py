@@ -100,6 +100,14 @@ class Maneuver:
         old, new = self.ratios
         return float(np.sign(abs(new) - abs(old)))
 
+    @property
+    def inertia_first(self) -> bool:
+        """True where the engine itself moves its speed to that of the new gear.
+
+        These are downshifts with the power on and upshifts with the power off.
+        """
+        return self.point.engine_torque * self.direction > 0.0
+
     def build_start(self, driveline: Driveline | None = None) -> State:
         """Return steady acceleration in the old gear, of another `driveline` if given."""
         driveline = driveline or self.driveline
@@ -142,22 +150,9 @@ class Maneuver:
         return replace(self, step=step)
 
 
-def check_torque_phase_first(maneuver: Maneuver) -> None:
-    """Raise InputError where the speeds change before the torque is handed over.
-
-    These are upshifts with the power off and downshifts with the power on, whose order of phases
-    the policy does not have.
-    """
-    torque, direction = maneuver.point.engine_torque, maneuver.direction
-    if direction == 0.0:
+def check_gears(maneuver: Maneuver) -> None:
+    """Raise InputError where both gears of a shift have the same overall ratio."""
+    if maneuver.direction == 0.0:
         raise InputError(
             "both gears of the shift have the same overall ratio", "choose two different gears"
-        )
-    if torque * direction >= 0.0:
-        kind = "downshift with the power on" if torque > 0.0 else "upshift without power"
-        least = "a positive" if direction < 0.0 else "a negative"
-        raise InputError(
-            f"a {kind} (engine torque {torque:.4g} N·m) cannot be calibrated: its speeds change "
-            "before the torque is handed over",
-            f"give {least} engine torque, or another shift",
         )

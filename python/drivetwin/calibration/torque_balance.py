@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,8 @@ REDUCTION = 0.15
 """Starting depth of the torque reduction, over the engine torque."""
 _LOCK_PRESSURE = 1.3
 """Starting pressure at the end of the inertia phase, over that in its middle."""
+_LEAST_KEPT = 0.2
+"""Least starting torque of a slipping off-going element, over the engine torque."""
 _HOLD_MARGIN = 1.25
 """Starting pressure of the off-going element before its release, over what carries the torque."""
 
@@ -46,16 +50,51 @@ def estimate_pressures(maneuver: Maneuver, system_pressure: float) -> PhasePress
     old, new = maneuver.offgoing, maneuver.oncoming
     handover = _compute_pressure(new, _compute_handover_torque(maneuver))
     inertia = _compute_pressure(new, _compute_inertia_torque(maneuver))
-    hold = _compute_pressure(old, _HOLD_MARGIN * _compute_held_torque(maneuver))
-    for name, needed in ((new.name, max(handover, inertia)), (old.name, hold)):
-        if needed >= system_pressure:
+    hold = _compute_pressure(old, _HOLD_MARGIN * _compute_held_torque(maneuver, old))
+    _require_pressure({new.name: max(handover, inertia), old.name: hold}, system_pressure)
+    sync = min(_LOCK_PRESSURE * inertia, 0.5 * (inertia + system_pressure))
+    return PhasePressures(handover, inertia, sync, hold, system_pressure)
+
+
+@dataclass(frozen=True)
+class SlipPressures:
+    """Pressures [Pa] of a shift whose inertia phase comes first.
+
+    `held` is that at which the off-going element begins to slip, `inertia` its pressure while the
+    engine speed changes, `handover` that of the on-coming element in the new gear, `system` that of
+    a held element.
+    """
+
+    held: float
+    inertia: float
+    handover: float
+    system: float
+
+
+def estimate_slip_pressures(maneuver: Maneuver, system_pressure: float) -> SlipPressures:
+    """Estimate the pressures of a shift whose inertia phase comes first.
+
+    The slipping off-going element leaves the engine the torque that changes its speed within
+    0.45 s, and keeps a fifth of the engine torque at least. Raises InputError where
+    `system_pressure` [Pa] cannot carry the engine torque.
+    """
+    old, new = maneuver.offgoing, maneuver.oncoming
+    held = _compute_pressure(old, _compute_held_torque(maneuver, old))
+    inertia = _compute_pressure(old, _compute_slipping_torque(maneuver))
+    handover = _compute_pressure(new, _compute_held_torque(maneuver, new))
+    _require_pressure({old.name: max(held, inertia), new.name: handover}, system_pressure)
+    return SlipPressures(held, inertia, handover, system_pressure)
+
+
+def _require_pressure(needed: Mapping[str, float], system_pressure: float) -> None:
+    """Raise InputError where an element needs more than `system_pressure` [Pa]."""
+    for name, pressure in needed.items():
+        if pressure >= system_pressure:
             raise InputError(
-                f"{name} needs {format_with_unit(needed, 'Pa', digits=3)} in this shift, the "
+                f"{name} needs {format_with_unit(pressure, 'Pa', digits=3)} in this shift, the "
                 f"system pressure is {format_with_unit(system_pressure, 'Pa', digits=3)}",
                 "give a smaller engine torque, or a larger system pressure",
             )
-    sync = min(_LOCK_PRESSURE * inertia, 0.5 * (inertia + system_pressure))
-    return PhasePressures(handover, inertia, sync, hold, system_pressure)
 
 
 def _compute_engine_inertia(maneuver: Maneuver) -> float:
@@ -63,9 +102,9 @@ def _compute_engine_inertia(maneuver: Maneuver) -> float:
     return model.J1 * model.eta + model.J2e
 
 
-def _compute_held_torque(maneuver: Maneuver) -> float:
-    """Torque [N m] of the off-going element in steady acceleration."""
-    ratio, element = maneuver.ratios[0], maneuver.offgoing
+def _compute_held_torque(maneuver: Maneuver, element: ShiftElement) -> float:
+    """Torque [N m] of an element in steady acceleration in its gear."""
+    ratio = maneuver.model.get_overall_ratio(element.name)
     torque = maneuver.point.engine_torque
     rate = ratio * maneuver.compute_acceleration(torque, ratio)
     free = maneuver.model.eta * torque - _compute_engine_inertia(maneuver) * rate
@@ -74,7 +113,18 @@ def _compute_held_torque(maneuver: Maneuver) -> float:
 
 def _compute_handover_torque(maneuver: Maneuver) -> float:
     """Torque [N m] with which the on-coming element alone holds the engine in the old gear."""
-    return _compute_held_torque(maneuver) * abs(maneuver.oncoming.i_c / maneuver.offgoing.i_c)
+    old, new = maneuver.offgoing, maneuver.oncoming
+    return _compute_held_torque(maneuver, old) * abs(new.i_c / old.i_c)
+
+
+def _compute_slipping_torque(maneuver: Maneuver) -> float:
+    """Torque [N m] of the slipping off-going element that leaves the engine its acceleration."""
+    old, new = maneuver.ratios
+    driving = maneuver.model.eta * maneuver.point.engine_torque
+    change = maneuver.point.engine_speed * (new / old - 1.0)
+    free = driving - _compute_engine_inertia(maneuver) * change / INERTIA_TIME
+    kept = max(free * math.copysign(1.0, driving), _LEAST_KEPT * abs(driving))
+    return abs(kept * maneuver.model.i_in * maneuver.offgoing.i_c)
 
 
 def _compute_inertia_torque(maneuver: Maneuver) -> float:

@@ -18,7 +18,7 @@ from drivetwin.calibration.calibrate import (
 from drivetwin.calibration.certificate import compute_quantiles
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.input_path import InputPath
-from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_torque_phase_first
+from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_gears
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.oil import OilFriction, OilState
@@ -76,7 +76,7 @@ def build_task(twin: Twin, request: Request) -> Task:
     point = _choose_point(twin, request)
     parts, path = twin.build_parts(model), InputPath.from_twin(twin)
     maneuver = Maneuver(model, point, request.wheel_radius, path=path, parts=parts)
-    check_torque_phase_first(maneuver)
+    check_gears(maneuver)
     units = None
     if request.policy.commands_actuators:
         units = _build_unit_draws(twin, maneuver, request)

@@ -60,7 +60,8 @@ class ControllerPolicy(Policy):
     def _build_oncoming(self, at: Mapping[str, float], filled: float, handed: float) -> Signal:
         middle = handed + at["inertia_share"] * at["inertia_time"]
         end = handed + at["inertia_time"]
-        return self._build_signal(
+        return build_profile(
+            self.horizon,
             (self.request, 0.0),
             (self.request + 0.8 * at["fill_time"], at["fill_pressure"]),
             (filled, at["kiss_pressure"]),
@@ -72,7 +73,8 @@ class ControllerPolicy(Policy):
 
     def _build_offgoing(self, at: Mapping[str, float], filled: float) -> Signal:
         release = filled + at["release_delay"]
-        return self._build_signal(
+        return build_profile(
+            self.horizon,
             (self.request, self.system_pressure),
             (filled, at["hold_pressure"]),
             (release, at["hold_pressure"]),
@@ -85,22 +87,13 @@ class ControllerPolicy(Policy):
         restore = max(
             begin + at["reduction_time"], handed + at["inertia_time"] + at["return_delay"]
         )
-        return self._build_signal(
+        return build_profile(
+            self.horizon,
             (begin, self.engine_torque),
             (begin + at["reduction_time"], reduced),
             (restore, reduced),
             (restore + at["return_time"], self.engine_torque),
         )
-
-    def _build_signal(self, *corners: tuple[float, float]) -> Signal:
-        """Return a signal that is constant before its first and after its last corner."""
-        times, values = [0.0], [corners[0][1]]
-        for time, value in corners:
-            times.append(max(time, times[-1] + _SHORTEST))
-            values.append(value)
-        times.append(max(self.horizon, times[-1]) + _SHORTEST)
-        values.append(values[-1])
-        return Signal(np.array(times), np.array(values))
 
 
 def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> ControllerPolicy:
@@ -111,7 +104,7 @@ def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> Contr
     """
     pressures = estimate_pressures(maneuver, system_pressure)
     parameters = (
-        *_list_fill_parameters(maneuver.oncoming),
+        *list_fill_parameters(maneuver.oncoming),
         *_list_torque_phase_parameters(pressures),
         *_list_inertia_parameters(pressures),
         *_list_torque_parameters(abs(maneuver.point.engine_torque)),
@@ -126,7 +119,23 @@ def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> Contr
     )
 
 
-def _list_fill_parameters(element: ShiftElement) -> tuple[PolicyParameter, ...]:
+def build_profile(horizon: float, *corners: tuple[float, float]) -> Signal:
+    """Build a signal through corners (time [s], value) from 0 to `horizon` [s].
+
+    It is constant before its first and after its last corner; corners that are out of order follow
+    each other at once.
+    """
+    times, values = [0.0], [corners[0][1]]
+    for time, value in corners:
+        times.append(max(time, times[-1] + _SHORTEST))
+        values.append(value)
+    times.append(max(horizon, times[-1]) + _SHORTEST)
+    values.append(values[-1])
+    return Signal(np.array(times), np.array(values))
+
+
+def list_fill_parameters(element: ShiftElement) -> tuple[PolicyParameter, ...]:
+    """List the parameters of the filling of an on-coming element."""
     contact = element.P0
     fill = _FILL_PRESSURE * contact
     top = max(contact, 1e4)

@@ -95,11 +95,13 @@ def join_profiles(
 def build_knot_policy(maneuver: Maneuver, start: Profiles, system_pressure: float) -> KnotPolicy:
     """Return knots through the profiles `start`; `system_pressure` [Pa] is that of a held element.
 
-    The knots lie between the request and 0.75 s after it; the engine torque may change towards the
-    new gear by 60 %.
+    The knots lie between the request and 0.75 s after it. The engine torque may change by 60 %:
+    towards the new gear, or against it where the inertia phase comes first.
     """
     torque = maneuver.point.engine_torque
-    reach = torque + _AUTHORITY * maneuver.direction * abs(torque)
+    sign = -1.0 if maneuver.inertia_first else 1.0
+    reach = torque + sign * _AUTHORITY * maneuver.direction * abs(torque)
+    released = _ONCOMING if maneuver.inertia_first else _OFFGOING
     bounds = (min(torque, reach), max(torque, reach))
     pressures = (0.0, system_pressure)
 
@@ -118,7 +120,7 @@ def build_knot_policy(maneuver: Maneuver, start: Profiles, system_pressure: floa
 
     return join_profiles(
         build(start.oncoming, _ONCOMING, pressures, (0.0, system_pressure)),
-        build(start.offgoing, _OFFGOING, pressures, (system_pressure, 0.0)),
+        build(start.offgoing, released, pressures, (system_pressure, 0.0)),
         build(start.engine_torque, _TORQUE, bounds, (torque, torque)),
         maneuver.request,
     )

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.policies.controller import build_controller_policy
+from drivetwin.calibration.policies.inertia_first import build_inertia_first_policy
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.knots import build_knot_policy
 from drivetwin.calibration.policies.own import UserController, build_own_policy
 from drivetwin.calibration.policies.slip import build_slip_policy
 from drivetwin.calibration.policy import Policy, Space
+from drivetwin.calibration.profiles import Profiles
 from drivetwin.errors import InputError
 from drivetwin.simulation.shift_control import ControlledUnit
 
@@ -33,18 +35,25 @@ class PolicySetup:
 
 
 def _build_controller(setup: PolicySetup) -> Policy:
-    return build_controller_policy(setup.maneuver, setup.system_pressure)
+    build = build_inertia_first_policy if setup.maneuver.inertia_first else build_controller_policy
+    return build(setup.maneuver, setup.system_pressure)
 
 
 def _build_knots(setup: PolicySetup) -> Policy:
     """Build the knots through the profiles with which the controller's parameters start."""
-    controller = build_controller_policy(setup.maneuver, setup.system_pressure)
-    start = controller.build_control(Space(controller).to_values(Space(controller).start))
+    space = Space(_build_controller(setup))
+    start = space.build_control(space.start)
+    assert isinstance(start, Profiles)
     return build_knot_policy(setup.maneuver, start, setup.system_pressure)
 
 
 def _build_slip(setup: PolicySetup) -> Policy:
     assert setup.unit is not None
+    if setup.maneuver.inertia_first:
+        raise InputError(
+            "the policy 'slip' has the torque phase first, and this shift the inertia phase",
+            "take --policy controller or knots, or your own controller (--controller FILE)",
+        )
     return build_slip_policy(setup.maneuver, setup.system_pressure, setup.unit, setup.task)
 
 
