@@ -35,6 +35,7 @@ from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.oil import OilFriction, OilState
 from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policy import Space
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task
@@ -59,13 +60,14 @@ def try_vehicle(seed: int, whole: bool, given: argparse.Namespace) -> Promise:
     """Identify, calibrate and try one vehicle; print a line."""
     begin = time.process_time()
     made = make_vehicle(seed, whole=whole, parts=True)
-    oil = OilState(_HEAT if given.hot else 0.0, _FRICTION)
-    found, jerk = _calibrate(made, given, oil)
+    found, jerk = _calibrate(made, given, OilState())
+    usual = float(np.quantile(jerk, 0.95))
+    if given.hot:
+        found, jerk = _calibrate(made, given, OilState(_HEAT, _FRICTION), found)
     promised = found.after.certificate.quantiles[Metric.PEAK_JERK].promised
     assert promised is not None
     result = Promise(promised, float(np.mean(jerk <= promised)), float(np.quantile(jerk, 0.95)))
     if given.hot:
-        usual = float(np.quantile(_calibrate(made, given, OilState())[1], 0.95))
         sys.stdout.write(f"with the oil of the log {usual:.1f} m/s3, {result.true / usual:.3f}: ")
     effects = ", ".join(f"{name} {size:.3g}" for name, size in made.effects.items()) or "none"
     pooled = found.after.certificate.quantiles[Metric.PEAK_JERK].share_95
@@ -79,15 +81,26 @@ def try_vehicle(seed: int, whole: bool, given: argparse.Namespace) -> Promise:
 
 
 def _calibrate(
-    made: MadeVehicle, given: argparse.Namespace, oil: OilState
+    made: MadeVehicle,
+    given: argparse.Namespace,
+    oil: OilState,
+    start: Calibration | None = None,
 ) -> tuple[Calibration, FloatArray]:
-    """Calibrate on the twin, and return the peak jerk of true units too, both with this oil."""
+    """Calibrate on the twin, and return the peak jerk of true units too, both with this oil.
+
+    The search begins at `start`, at equal places between the bounds as on a map.
+    """
     request = replace(
         _build_request(made, given.effort),
         oil_temperature=_LOG + oil.change,
         oil=replace(oil.friction, log_temperature=_LOG),
     )
-    found = calibrate(build_task(made.twin, request))
+    task = build_task(made.twin, request)
+    if start is not None:
+        same = Space(start.task.policy).to_coordinates(start.after.values)
+        values = Space(task.policy).to_values(same)
+        task = build_task(made.twin, replace(request, start=task.policy.name_values(values)))
+    found = calibrate(task)
     units = draw_true_units(made, found.task.maneuver, Spread(), given.units, 0)
     warm = [replace(one, model=oil.warm(one.model)) for one in units.units]
     outcome = replace(units, units=warm).evaluate(found.after.control)

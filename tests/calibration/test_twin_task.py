@@ -137,6 +137,7 @@ def test_the_own_policy_needs_a_controller() -> None:
         build_task(make_hydraulic_twin(), replace(REQUEST, policy=PolicyKind.OWN, limits=()))
 
 
-def test_a_downshift_with_power_is_refused() -> None:
-    with pytest.raises(InputError, match="downshift with the power on"):
-        build_task(make_twin(), replace(REQUEST, gears=("3", "2")))
+def test_a_downshift_with_power_has_its_own_parameters() -> None:
+    task = build_task(make_twin(), replace(REQUEST, gears=("3", "2"), limits=()))
+    assert task.maneuver.inertia_first
+    assert "assist_pressure" in [one.name for one in task.policy.parameters]

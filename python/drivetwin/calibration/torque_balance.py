@@ -61,12 +61,14 @@ class SlipPressures:
     """Pressures [Pa] of a shift whose inertia phase comes first.
 
     `held` is that at which the off-going element begins to slip, `inertia` its pressure while the
-    engine speed changes, `handover` that of the on-coming element in the new gear, `system` that of
-    a held element.
+    engine speed changes. `assist` is that of the on-coming element meanwhile, which gives the
+    torque that the engine itself lacks; `handover` is its pressure in the new gear, `system` that
+    of a held element.
     """
 
     held: float
     inertia: float
+    assist: float
     handover: float
     system: float
 
@@ -75,15 +77,18 @@ def estimate_slip_pressures(maneuver: Maneuver, system_pressure: float) -> SlipP
     """Estimate the pressures of a shift whose inertia phase comes first.
 
     The slipping off-going element leaves the engine the torque that changes its speed within
-    0.45 s, and keeps a fifth of the engine torque at least. Raises InputError where
-    `system_pressure` [Pa] cannot carry the engine torque.
+    0.45 s, and keeps a fifth of the engine torque at least. The on-coming element gives the rest.
+    Raises InputError where `system_pressure` [Pa] cannot carry the engine torque.
     """
     old, new = maneuver.offgoing, maneuver.oncoming
     held = _compute_pressure(old, _compute_held_torque(maneuver, old))
-    inertia = _compute_pressure(old, _compute_slipping_torque(maneuver))
+    slipping, missing = _split_engine_torque(maneuver)
+    inertia = _compute_pressure(old, slipping)
+    assist = _compute_pressure(new, missing)
     handover = _compute_pressure(new, _compute_held_torque(maneuver, new))
-    _require_pressure({old.name: max(held, inertia), new.name: handover}, system_pressure)
-    return SlipPressures(held, inertia, handover, system_pressure)
+    needed = {old.name: max(held, inertia), new.name: max(assist, handover)}
+    _require_pressure(needed, system_pressure)
+    return SlipPressures(held, inertia, assist, handover, system_pressure)
 
 
 def _require_pressure(needed: Mapping[str, float], system_pressure: float) -> None:
@@ -117,14 +122,20 @@ def _compute_handover_torque(maneuver: Maneuver) -> float:
     return _compute_held_torque(maneuver, old) * abs(new.i_c / old.i_c)
 
 
-def _compute_slipping_torque(maneuver: Maneuver) -> float:
-    """Torque [N m] of the slipping off-going element that leaves the engine its acceleration."""
+def _split_engine_torque(maneuver: Maneuver) -> tuple[float, float]:
+    """Torques [N m] of the off-going and on-coming element that give the engine its acceleration.
+
+    The off-going element takes what the engine has too much, at least a share of the engine torque;
+    the on-coming element adds what the engine then lacks.
+    """
     old, new = maneuver.ratios
-    driving = maneuver.model.eta * maneuver.point.engine_torque
+    model, driving = maneuver.model, maneuver.model.eta * maneuver.point.engine_torque
     change = maneuver.point.engine_speed * (new / old - 1.0)
     free = driving - _compute_engine_inertia(maneuver) * change / INERTIA_TIME
-    kept = max(free * math.copysign(1.0, driving), _LEAST_KEPT * abs(driving))
-    return abs(kept * maneuver.model.i_in * maneuver.offgoing.i_c)
+    surplus = free * math.copysign(1.0, driving)
+    kept = max(surplus, _LEAST_KEPT * abs(driving))
+    slipping = kept * abs(model.i_in * maneuver.offgoing.i_c)
+    return slipping, (kept - surplus) * abs(model.i_in * maneuver.oncoming.i_c)
 
 
 def _compute_inertia_torque(maneuver: Maneuver) -> float:

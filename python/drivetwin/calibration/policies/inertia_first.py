@@ -5,9 +5,9 @@ These are downshifts with the power on and upshifts with the power off: the engi
 speed to that of the new gear as soon as the off-going element lets it. Events in the order of time:
 the off-going pressure falls until its element slips, and then follows two straight lines, by which
 the slipping element keeps torque at the output and sets the rate of the engine speed; the on-coming
-element waits filled at its kiss pressure; at the synchronous speed its pressure rises to the
-hand-over value while the off-going element is released; a final ramp locks it. The engine torque is
-reduced about the synchronous speed. Pressures are those at the clutch.
+element is filled, and adds what torque the engine lacks; at the synchronous speed its pressure
+rises to the hand-over value while the off-going element is released; a final ramp locks it. The
+engine torque is reduced about the synchronous speed. Pressures are those at the clutch.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ from drivetwin.calibration.torque_balance import (
     estimate_slip_pressures,
 )
 from drivetwin.simulation.dual_clutch import Signal
+
+_RISE = 0.05
+"""Rise of the on-coming pressure at the begin of the inertia phase [s]."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,8 @@ class InertiaFirstPolicy(Policy):
             (self.request, 0.0),
             (self.request + 0.8 * at["fill_time"], at["fill_pressure"]),
             (filled, at["kiss_pressure"]),
-            (begin, at["kiss_pressure"]),
+            (max(filled, self.request + at["drop_time"]) + _RISE, at["assist_pressure"]),
+            (begin, at["assist_pressure"]),
             (handed, at["handover_pressure"]),
             (handed + at["lock_ramp_time"], self.system_pressure),
         )
@@ -103,7 +107,7 @@ def build_inertia_first_policy(maneuver: Maneuver, system_pressure: float) -> In
     pressures = estimate_slip_pressures(maneuver, system_pressure)
     parameters = (
         *list_fill_parameters(maneuver.oncoming),
-        *_list_inertia_parameters(pressures),
+        *_list_inertia_parameters(pressures, maneuver.oncoming.P0),
         *_list_torque_phase_parameters(pressures),
         *_list_torque_parameters(abs(maneuver.point.engine_torque)),
     )
@@ -117,9 +121,14 @@ def build_inertia_first_policy(maneuver: Maneuver, system_pressure: float) -> In
     )
 
 
-def _list_inertia_parameters(pressures: SlipPressures) -> tuple[PolicyParameter, ...]:
+def _list_inertia_parameters(
+    pressures: SlipPressures, contact: float
+) -> tuple[PolicyParameter, ...]:
     held, middle, highest = pressures.held, pressures.inertia, pressures.system
+    assist = max(pressures.assist, 1e4)
     return (
+        PolicyParameter("assist_pressure", "Pa", 0.5 * contact, min(2.0 * assist, highest),
+                        assist, "on-coming pressure in the inertia phase"),
         PolicyParameter("drop_time", "s", 0.03, 0.30, 0.10,
                         "request to the begin of the slip of the off-going element"),
         PolicyParameter("slip_pressure", "Pa", 0.4 * held, min(1.4 * held, highest), held,
