@@ -22,6 +22,8 @@ _LOCK_PRESSURE = 1.3
 """Starting pressure at the end of the inertia phase, over that in its middle."""
 _LEAST_KEPT = 0.2
 """Least starting torque of a slipping off-going element, over the engine torque."""
+_LONGEST_INERTIA_TIME = 0.7
+"""Longest starting duration of an inertia phase that the engine itself drives [s]."""
 _HOLD_MARGIN = 1.25
 """Starting pressure of the off-going element before its release, over what carries the torque."""
 
@@ -63,13 +65,14 @@ class SlipPressures:
     `held` is that at which the off-going element begins to slip, `inertia` its pressure while the
     engine speed changes. `assist` is that of the on-coming element meanwhile, which gives the
     torque that the engine itself lacks; `handover` is its pressure in the new gear, `system` that
-    of a held element.
+    of a held element. `time` [s] is the duration of the inertia phase.
     """
 
     held: float
     inertia: float
     assist: float
     handover: float
+    time: float
     system: float
 
 
@@ -77,8 +80,9 @@ def estimate_slip_pressures(maneuver: Maneuver, system_pressure: float) -> SlipP
     """Estimate the pressures of a shift whose inertia phase comes first.
 
     The slipping off-going element leaves the engine the torque that changes its speed within
-    0.45 s, and keeps a fifth of the engine torque at least. The on-coming element gives the rest.
-    Raises InputError where `system_pressure` [Pa] cannot carry the engine torque.
+    0.45 s, or as long as that takes with a fifth of the engine torque kept. The on-coming element
+    helps where this is more than 0.7 s. Raises InputError where `system_pressure` [Pa] cannot carry
+    the engine torque.
     """
     old, new = maneuver.offgoing, maneuver.oncoming
     held = _compute_pressure(old, _compute_held_torque(maneuver, old))
@@ -88,7 +92,8 @@ def estimate_slip_pressures(maneuver: Maneuver, system_pressure: float) -> SlipP
     handover = _compute_pressure(new, _compute_held_torque(maneuver, new))
     needed = {old.name: max(held, inertia), new.name: max(assist, handover)}
     _require_pressure(needed, system_pressure)
-    return SlipPressures(held, inertia, assist, handover, system_pressure)
+    time = _choose_inertia_time(maneuver)
+    return SlipPressures(held, inertia, assist, handover, time, system_pressure)
 
 
 def _require_pressure(needed: Mapping[str, float], system_pressure: float) -> None:
@@ -122,6 +127,15 @@ def _compute_handover_torque(maneuver: Maneuver) -> float:
     return _compute_held_torque(maneuver, old) * abs(new.i_c / old.i_c)
 
 
+def _choose_inertia_time(maneuver: Maneuver) -> float:
+    """Choose the starting duration of an inertia phase that the engine itself drives [s]."""
+    old, new = maneuver.ratios
+    driving = maneuver.model.eta * maneuver.point.engine_torque
+    change = maneuver.point.engine_speed * (new / old - 1.0)
+    own = _compute_engine_inertia(maneuver) * change / ((1.0 - _LEAST_KEPT) * driving)
+    return min(max(own, INERTIA_TIME), _LONGEST_INERTIA_TIME)
+
+
 def _split_engine_torque(maneuver: Maneuver) -> tuple[float, float]:
     """Torques [N m] of the off-going and on-coming element that give the engine its acceleration.
 
@@ -131,7 +145,8 @@ def _split_engine_torque(maneuver: Maneuver) -> tuple[float, float]:
     old, new = maneuver.ratios
     model, driving = maneuver.model, maneuver.model.eta * maneuver.point.engine_torque
     change = maneuver.point.engine_speed * (new / old - 1.0)
-    free = driving - _compute_engine_inertia(maneuver) * change / INERTIA_TIME
+    time = _choose_inertia_time(maneuver)
+    free = driving - _compute_engine_inertia(maneuver) * change / time
     surplus = free * math.copysign(1.0, driving)
     kept = max(surplus, _LEAST_KEPT * abs(driving))
     slipping = kept * abs(model.i_in * maneuver.offgoing.i_c)

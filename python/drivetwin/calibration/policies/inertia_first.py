@@ -21,7 +21,6 @@ from drivetwin.calibration.policies.controller import build_profile, list_fill_p
 from drivetwin.calibration.policy import Policy, PolicyParameter
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.torque_balance import (
-    INERTIA_TIME,
     REDUCTION,
     SlipPressures,
     estimate_slip_pressures,
@@ -139,7 +138,7 @@ def _list_inertia_parameters(
                         "place of the inertia pressure within the inertia phase"),
         PolicyParameter("sync_pressure", "Pa", 0.3 * middle, min(1.5 * held, highest),
                         min(held, 1.1 * middle), "off-going pressure at the synchronous speed"),
-        PolicyParameter("inertia_time", "s", 0.15, 0.90, INERTIA_TIME,
+        PolicyParameter("inertia_time", "s", 0.15, 0.90, pressures.time,
                         "begin of the slip to the planned synchronous speed"),
     )  # fmt: skip
 
