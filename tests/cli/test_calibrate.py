@@ -242,8 +242,6 @@ def test_front_and_map_are_in_the_files(
         ),
         (("--shift", "2"), "does not name two gears"),
         (("--shift", "2-7"), "has no gear '7'"),
-        (("--shift", "3-2"), "downshift with the power on"),
-        (("--shift", "2-3", "--engine-torque", "-50"), "upshift without power"),
         (("--shift", "2-3", "--system-pressure", "2"), "system pressure is 2.00 bar"),
     ],
 )
