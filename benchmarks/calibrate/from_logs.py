@@ -68,7 +68,7 @@ _WORSE = 0.03
 _POLISHED, _POLISHES, _ITERATIONS = 128, 3, 6
 """True units, number and linear programs of the polishes of the optimum."""
 _LIGHT = CalibrationSettings(
-    polish_draws=128,
+    polish_draws=64,
     tail_draws=512,
     tail_share=CalibrationSettings.search_share,
     check_draws=400,
@@ -84,8 +84,10 @@ its tail mean is higher on others, and on true units.
 The penalty is so large that the limit holds by it and seldom by a repair: results and optimum are
 compared by that objective.
 """
-_WARM = replace(_LIGHT, starts=0, polish_draws=64, polish_iterations=4, tail_iterations=6)
-"""Settings after a log: a shorter polish from the last result."""
+_LAST = replace(_LIGHT, starts=0, polish_iterations=4, tail_iterations=6)
+"""Settings after the last log: a shorter polish from the best calibration so far."""
+_WARM = replace(_LAST, tail_draws=128)
+"""Settings on the way: fewer draws."""
 
 
 @dataclass(frozen=True)
@@ -93,13 +95,15 @@ class Trial:
     """Objective [m/s^3] on true units: robust start and after each log, and the optimum.
 
     `relocked` counts the true units that slip again after lock-up with the last calibration,
-    `refused` the shifts whose logs the corrected twin did not explain.
+    `refused` the shifts whose logs the corrected twin did not explain; `ratio` is the largest
+    deviation of a signal in a phase that it left last, over the expected one.
     """
 
     learned: tuple[float, ...]
     optimum: float
     relocked: int
-    refused: int
+    refused: int = 0
+    ratio: float = 0.0
 
     @property
     def excess(self) -> float:
@@ -120,10 +124,12 @@ def learn_vehicle(made: MadeVehicle, given: argparse.Namespace) -> Trial:
     request, task = replace(request, limits=limits), task.set_limits(limits)
     weight = build_objective(task, make_quick_plant(task)).weight
     values, driven, refused = [_calibrate(made.twin, request, weight)], list[DrivenShift](), 0
+    ratio = 0.0
     for number in range(1, SHIFTS + 1):
         driven.append(_drive(made, task, values[-1], number))
         try:
             found = correct_twin(made.twin, driven, request.spread, made.seed)
+            ratio = max(one.ratio for one in found.phases)
             require_explained(found)
         except IdentificationError as error:
             refused += 1
@@ -131,9 +137,11 @@ def learn_vehicle(made: MadeVehicle, given: argparse.Namespace) -> Trial:
             values.append(values[-1])
             continue
         starts = [task.policy.name_values(one) for one in values]
-        warm = choose_start(found.twin, replace(request, settings=_WARM), starts)
+        settings = _LAST if number == SHIFTS else _WARM
+        warm = choose_start(found.twin, replace(request, settings=settings), starts)
         values.append(_calibrate(found.twin, warm, weight))
-    return _compare(made, task, (values, weight, refused), given.units)
+    trial = _compare(made, task, (values, weight), given.units)
+    return replace(trial, refused=refused, ratio=ratio)
 
 
 def _drive(made: MadeVehicle, task: Task, values: FloatArray, number: int) -> DrivenShift:
@@ -155,10 +163,10 @@ def _calibrate(twin: Twin, request: Request, weight: float) -> FloatArray:
 
 
 def _compare(
-    made: MadeVehicle, task: Task, found: tuple[Sequence[FloatArray], float, int], units: int
+    made: MadeVehicle, task: Task, found: tuple[Sequence[FloatArray], float], units: int
 ) -> Trial:
     """Compare calibrations with the optimum on fresh true units."""
-    space, (values, weight, refused) = Space(task.policy), found
+    space, (values, weight) = Space(task.policy), found
     polished, fresh = (
         draw_true_units(made, task.maneuver, Spread(), count, seed)
         for seed, count in enumerate((_POLISHED, units))
@@ -176,7 +184,7 @@ def _compare(
         )
         best.append(_assess(objective, fresh.evaluate(space.build_control(one.coordinates))))
     relocked = int(outcomes[-1].relocked.sum())
-    return Trial(tuple(reached), min(*reached, *best), relocked, refused)
+    return Trial(tuple(reached), min(*reached, *best), relocked)
 
 
 def _assess(objective: Objective, outcome: Outcome) -> float:
@@ -206,7 +214,8 @@ def try_vehicle(seed: int, given: argparse.Namespace) -> Trial:
     sys.stdout.write(
         f"vehicle {seed} ({effects}): {learned}, optimum {trial.optimum:.1f} m/s3, "
         f"{100.0 * trial.excess:.1f} % above, {100.0 * trial.worse:+.1f} % to the robust start, "
-        f"{trial.refused} refused, {trial.relocked} of {given.units} slip again; "
+        f"{trial.refused} refused, deviation {trial.ratio:.2f} of the expected one, "
+        f"{trial.relocked} of {given.units} slip again; "
         f"{time.process_time() - begin:.0f} s of CPU\n"
     )
     sys.stdout.flush()

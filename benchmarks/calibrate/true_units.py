@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from drivetwin.calibration.input_path import DIRECT
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.profiles import Control, Profiles
-from drivetwin.calibration.scenarios import collect_scenarios, scale_units
+from drivetwin.calibration.scenarios import Scenarios, collect_scenarios, scale_units
 from drivetwin.calibration.spread import Spread
 from drivetwin.channels.pressure_roles import get_command_element
 from drivetwin.channels.shiftlog import ShiftLog
@@ -43,6 +43,8 @@ class TrueUnits:
     made: MadeVehicle
     shift: Maneuver
     units: Sequence[SyntheticVehicle]
+    drawn: dict[float, Scenarios] = field(init=False, default_factory=dict, repr=False)
+    """Units in steady acceleration by engine torque [N m]: they start alike with every control."""
 
     def evaluate_all(self, controls: Sequence[Control]) -> list[Outcome]:
         """Return the metrics of each control over all units."""
@@ -60,10 +62,12 @@ class TrueUnits:
         driving = float(torque.values[0]) - parts.input_drag
         point = OperatingPoint(driving, shift.point.engine_speed)
         own = replace(shift, model=self.units[0].model, point=point, parts=parts, path=DIRECT)
-        drivelines = [Driveline(one.model, one.parts) for one in self.units]
+        if driving not in self.drawn:
+            drivelines = [Driveline(one.model, one.parts) for one in self.units]
+            self.drawn[driving] = collect_scenarios(own, drivelines)
         profiles = Profiles(torque, *(acting["pressures"][name] for name in names))
         plant = Plant(own, threads=1, metrics=_METRICS)
-        return plant.evaluate(profiles, collect_scenarios(own, drivelines))
+        return plant.evaluate(profiles, self.drawn[driving])
 
 
 def draw_true_units(

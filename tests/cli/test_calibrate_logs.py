@@ -49,6 +49,13 @@ def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(
     assert main([*given, *short, *logs, "-o", str(second), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["correction"]["rms_after"]["output_torque"] < 30.0
+    assert found["correction"]["calibrations"] == [None]  # the bench drove the starting values
+    assert "log_follows_no_calibration" in [one["code"] for one in found["findings"]]
+    gain = found["correction"]["learned"]["mu.B3"]
+    assert gain["after_std"] < 0.5 * gain["before_std"]
+    page = (second / "report.html").read_text(encoding="utf-8")
+    assert "Learned from logs" in page
+    assert "gain to expect" in page
     learned = load_twin(second / "twin.toml")
     ratio = learned.friction["B3"].mu[5] / twin.friction["B3"].mu[5]
     assert ratio == pytest.approx(1.04, abs=0.015)
@@ -57,6 +64,14 @@ def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(
     starts = {name: one.start for name, one in content.parameters.items()}
     before = read_calibration_file(first / "calibration.toml").parameters
     assert starts["kiss_pressure"] == pytest.approx(before["kiss_pressure"].value)
+    twice = [
+        "--start",
+        str(first / "calibration.toml"),
+        "--start",
+        str(second / "calibration.toml"),
+    ]
+    assert main([*given, *short, *twice, "-o", str(tmp_path / "none")]) == 2
+    assert "2 starts are given without a log" in capsys.readouterr().err
     other = ["calibrate", str(source), "--shift", "3-2", "--from-logs", str(log)]
     assert main([*other, "-o", str(tmp_path / "none")]) == 2
     assert "has no shift 3-2, only 2-3" in capsys.readouterr().err

@@ -12,7 +12,7 @@ of Mathematical Statistics 35 (1964), for the weights of large deviations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,16 +76,22 @@ LEARN = LearnSettings()
 class Correction:
     """Corrected twin; RMS deviations (SI) by signal over all shifts, `before` and `after`.
 
-    `values` are what the logs determined. `misfits` are signals and phases that the corrected twin
-    does not explain, the worst first; `shifts` those that it was corrected by.
+    `values` are what the logs determined. `phases` are the deviations that the corrected twin
+    leaves by signal and phase; `shifts` those that it was corrected by.
     """
 
     twin: Twin
     before: dict[str, float]
     after: dict[str, float]
     values: tuple[LearnedValue, ...]
-    misfits: tuple[PhaseDeviation, ...]
+    phases: tuple[PhaseDeviation, ...]
     shifts: tuple[DrivenShift, ...]
+
+    @property
+    def misfits(self) -> tuple[PhaseDeviation, ...]:
+        """Signals and phases that the corrected twin does not explain, the worst first."""
+        found = [one for one in self.phases if one.ratio > LEARN.misfit]
+        return tuple(sorted(found, key=lambda one: -one.ratio))
 
 
 def correct_twin(
@@ -116,7 +122,7 @@ def correct_twin(
         _compute_rms(problem.list_deviations(first)),
         _compute_rms(found.list_deviations(z)),
         found.unknowns.describe_values(z, covariance),
-        tuple(found.list_misfits(z)),
+        tuple(found.list_phases(z)),
         tuple(one.driven for one in shifts),
     )
 
@@ -134,7 +140,7 @@ def require_explained(found: Correction) -> None:
     rest = f"; {more} other signals and phases depart too" if more else ""
     raise IdentificationError(
         f"the corrected twin does not explain the {_PHASES[worst.phase]}: {worst.role} departs by "
-        f"{rms} (RMS), {worst.rms / worst.expected:.1f} times the {expected} that noise and usual "
+        f"{rms} (RMS), {worst.ratio:.1f} times the {expected} that noise and usual "
         f"errors of the model explain{rest}",
         "check that --start is the calibration of the log, and that the twin is of this vehicle; "
         "else identify the vehicle again from a log of this shift",
@@ -264,12 +270,10 @@ class LogsObjective:
                 found.setdefault(name, []).append(values)
         return found
 
-    def list_misfits(self, z: FloatArray) -> Iterator[PhaseDeviation]:
-        """List signals and phases that values (m,) do not explain, the worst first."""
+    def list_phases(self, z: FloatArray) -> list[PhaseDeviation]:
+        """List the deviations that values (m,) leave, by shift, signal and phase."""
         driveline, path = self._build(z)
-        found = [one for shift in self.shifts for one in shift.list_phases(driveline, path)]
-        misfits = [one for one in found if one.rms > LEARN.misfit * one.expected]
-        yield from sorted(misfits, key=lambda one: -one.rms / one.expected)
+        return [one for shift in self.shifts for one in shift.list_phases(driveline, path)]
 
     def rescale(self, z: FloatArray) -> LogsObjective:
         """Return the objective with scales by the deviations that values (m,) leave."""
@@ -313,7 +317,7 @@ class _Search:
                 for place, start in enumerate(starts):
                     notify_progress((place + 1) / (len(starts) + 1))
                     self._refine(start)
-            if self.best is not None and not any(self._list_misfits(self.best)):
+            if self.best is not None and self._explains(self.best):
                 break
         if self.best is None:
             raise IdentificationError(
@@ -322,8 +326,9 @@ class _Search:
             )
         return self.best
 
-    def _list_misfits(self, found: Found) -> Iterator[PhaseDeviation]:
-        return self.problem.list_misfits(found.point.values)
+    def _explains(self, found: Found) -> bool:
+        every = self.problem.list_phases(found.point.values)
+        return all(one.ratio <= LEARN.misfit for one in every)
 
     def _screen(self, number: int) -> list[FloatArray]:
         shape, lower = (LEARN.draws, self.problem.unknowns.count), self.problem.lower
