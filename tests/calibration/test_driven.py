@@ -17,10 +17,7 @@ from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.twin_task import Request, build_profiles
 from drivetwin.errors import IdentificationError
-from drivetwin.files.calibration_file import read_calibration_file
-from drivetwin.files.twin_file import load_twin
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.shifts.detect import require_shifts
@@ -31,7 +28,6 @@ from tests.calibration.bench import write_bench_log
 from tests.calibration.cases import SYSTEM
 from tests.calibration.twins import make_twin
 
-CASE = Path("/work/shared/cases/from_logs")
 REQUEST, POINT = 1.5, OperatingPoint(1400.0, 175.0)
 """Request in the logs of the bench [s], and its operating point."""
 
@@ -112,23 +108,6 @@ def test_logs_of_another_vehicle_are_refused_with_signal_and_phase(
     assert caught.value.where.channel is not None
     assert caught.value.where.time is not None
     assert "--start" in caught.value.remedy
-
-
-@pytest.mark.skipif(not CASE.is_dir(), reason="the shared case is absent")
-def test_a_vehicle_with_another_order_of_events_is_found() -> None:
-    """The clutch of the vehicle locks, slips and locks again; that of the twin locks once."""
-    twin = load_twin(CASE / "twin.toml")
-    content = read_calibration_file(CASE / "calibration.toml")
-    values = {name: one.value for name, one in content.parameters.items()}
-    shift, profiles = build_profiles(twin, Request(gears=("2", "3")), values)
-    assert profiles is not None
-    logged = read(twin, CASE / "vehicle_in_model.csv")
-    driven = match_profiles(logged, {"given": profiles}, shift)
-    assert driven.calibration == "given"
-    found = correct_twin(twin, [driven], Spread())
-    assert found.before["output_torque"] > 250.0
-    assert found.after["output_torque"] < 37.0  # the noise of the sensor is 35 N·m
-    require_explained(found)
 
 
 def test_the_path_delays_lags_and_scales_inputs() -> None:
