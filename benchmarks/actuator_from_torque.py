@@ -26,7 +26,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.actuators import ControlledActuator
 from drivetwin.dyno.dyno import DynoRun, run

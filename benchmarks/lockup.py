@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.lockup import (
     IdentifiedLockup,
     LockupClutch,
@@ -29,7 +28,7 @@ from drivetwin.actuator.lockup import (
     identify_lockup,
     simulate_slip,
 )
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
 from drivetwin.channels.units import RPM
 from drivetwin.estimation.result.estimate import Z95
 

@@ -23,8 +23,7 @@ from typing import TypeVar
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import attach_listener
-from drivetwin._util.timed_stages import TABLE, record_stages
+from drivetwin._util.progress import TABLE, attach_listener, record_stages
 from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.calibrate import Task as CalibrationTask
 from drivetwin.calibration.front import trace_front
@@ -33,8 +32,8 @@ from drivetwin.calibration.operating_map import Grid, calibrate_map
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli.identify_run import IdentifyOptions, read_shifts
+from drivetwin.cli.output import Remaining
 from drivetwin.cli.synth import write_run
-from drivetwin.cli.time_left import Remaining
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis.experiment_design import rank_experiments

@@ -35,8 +35,8 @@ from drivetwin.modeling.element_help import document_methods
 from drivetwin.modeling.model_parts import ModelParts, Place
 from drivetwin.modeling.part import Part
 from drivetwin.modeling.plates import Plates
-from drivetwin.simulation.converter_map import Converter
-from drivetwin.simulation.input_value import InputValue
+from drivetwin.simulation.network import InputValue
+from drivetwin.simulation.vehicle_parts import Converter
 
 
 @document_methods

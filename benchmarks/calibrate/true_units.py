@@ -19,7 +19,7 @@ from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.profiles import Control, Profiles
 from drivetwin.calibration.scenarios import Scenarios, collect_scenarios, scale_units
 from drivetwin.calibration.spread import Spread
-from drivetwin.channels.pressure_roles import get_command_element
+from drivetwin.channels.roles import get_command_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (

@@ -29,20 +29,16 @@ from benchmarks.estimation.vehicles import (
     misread,
 )
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.held_signal import HeldSignal
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Runs, compute_metrics
 from drivetwin.calibration.profiles import ClosedLoop
-from drivetwin.channels.pressure_roles import make_command_role
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity, make_command_role
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import ControlledActuator, Program
-from drivetwin.dyno.dyno import DynoRun, run
+from drivetwin.dyno.dyno import DynoRun, apply_effects, run
 from drivetwin.dyno.files import convert_channels
-from drivetwin.dyno.mismatched_run import apply_effects
-from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.scenario import Scenario, Sensor
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     NominalRun,
     SyntheticVehicle,

@@ -10,13 +10,12 @@ from itertools import pairwise
 from pathlib import Path
 
 from benchmarks.estimation.vehicles import SHIFT, add_tolerances, draw_vehicle, misread
-from drivetwin.channels.pressure_roles import get_pressure_element
-from drivetwin.channels.shiftlog import Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity, get_pressure_element
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.files import convert_channels
-from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.scenario import Scenario, Sensor
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log
 from drivetwin.simulation.dual_clutch import RoadLoad

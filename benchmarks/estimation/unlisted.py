@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.dyno import DynoRun
 

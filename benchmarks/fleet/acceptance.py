@@ -18,11 +18,11 @@ from time import perf_counter
 
 from drivetwin.cli.fleet_view import show_progress
 from drivetwin.estimation.result.method import Method
+from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.events import Event, Settled
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet
 from drivetwin.fleet.mixed_model.result import Interval, JointEstimate
 from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State

@@ -28,11 +28,11 @@ from time import perf_counter
 from typing import Any
 
 from drivetwin.estimation.result.method import Method
+from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.events import Event, Settled, Started
-from drivetwin.fleet.guarded_worker import ONE_THREAD
+from drivetwin.fleet.pool import ONE_THREAD
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State

@@ -15,8 +15,7 @@ from drivetwin.gearbox import load_gearbox
 from drivetwin.gearbox import reduce as reduce_shift
 from drivetwin.gearbox.compare import build_dual_clutch_form, build_whole_gearbox
 from drivetwin.gearbox.maneuver import build_signals, build_time_grid, plan
-from drivetwin.simulation.driveline import SHAFT, WHEEL, build_driveline
-from drivetwin.simulation.driveline_start import build_start
+from drivetwin.simulation.driveline import SHAFT, WHEEL, build_driveline, build_start
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import Element, Output, Start, simulate
 from drivetwin.simulation.vehicle_parts import NO_PARTS

@@ -1,9 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Exception classes of the package; each error has a cause, a place and a remedy."""
+"""Exception classes of the package; each error has a cause, a place and a remedy.
+
+Remedies suggest the spelling of a misspelt word.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+
+def suggest_spelling(word: str, known: Iterable[str]) -> str:
+    """Return `; did you mean 'x'?` for the nearest of the `known` words, else what is known."""
+    words = list(known)
+    by_folded = {each.casefold(): each for each in words}
+    near = get_close_matches(word.casefold(), by_folded, n=1)
+    if near:
+        return f"; did you mean {by_folded[near[0]]!r}?"
+    return f"; known here: {', '.join(words)}" if words else ""
+
 
 PYTHON_WORDS = {
     "(--channels": "(argument 'mapping'",

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Identification from logs, a vehicle card and detected shifts: prepare, then estimate.
-
-Checks of logs that are to be fitted together.
-"""
+"""Identification from logs, a vehicle card and detected shifts: check, prepare, estimate."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
 from drivetwin.estimation.data.actuators import (

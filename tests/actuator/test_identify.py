@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from benchmarks.actuator import list_errors, make_actuator, record
-from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import (
     IdentifiedActuator,
     PressureRecord,
     identify_actuator,
 )
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
 from drivetwin.errors import IdentificationError
 
 NAMES = list(QUANTITIES)

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.lockup import LockupClutch, SlipRecord, identify_lockup, simulate_slip
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.errors import IdentificationError
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Start, build_element, simulate

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.held_signal import HeldSignal
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
 from drivetwin.errors import InputError
 
 BAR = 1e5

@@ -16,8 +16,7 @@ from drivetwin.authoring.questions import Sources
 from drivetwin.authoring.session import Session
 from drivetwin.authoring.stated_number import StatedNumber, parse_ratio, parse_ratios, parse_stated
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.distribution import DIGIT_STD, describe_ratio, parse_teeth
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import DIGIT_STD, PriorValue, describe_ratio, parse_teeth
 from tests.authoring.test_session import answer_valid
 
 FIXED = CardOptions({"--engine-inertia": "4..20", "--mass": "12000", "--wheel-radius": "0.5"})

@@ -11,9 +11,9 @@ from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.profiles import Profiles
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
-from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.scenario import Sensor
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import TorqueError
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.simulation.driveline_run import DrivelineTask

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel
 from drivetwin.channels.mapping import Fallback, combine_specs, resolve_roles
-from drivetwin.channels.read_options import Column
+from drivetwin.channels.read_options import ChannelSpec, Column, RememberedChannel
 from drivetwin.channels.recognition import infer_candidates
 from drivetwin.channels.roles import NEEDED
 from drivetwin.errors import MappingError, MissingChannelError

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_file import ByRole, ChannelTable, read_mapping
 from drivetwin.channels.mapping_text import format_mapping
-from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
+from drivetwin.channels.read_options import BusOptions, ChannelSpec, ReadOptions, TimeColumn
 from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES
 from drivetwin.errors import MappingError
 

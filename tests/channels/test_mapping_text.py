@@ -10,12 +10,11 @@ from pathlib import Path
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import Candidate, Draft, Stub, UnitGap, format_mapping
-from drivetwin.channels.read_options import Column
-from drivetwin.channels.unit_proposals import Proposal
+from drivetwin.channels.read_options import ChannelSpec, Column
+from drivetwin.channels.units import Proposal
 
 NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
 """Any names of columns; lone surrogates cannot be written in UTF-8."""

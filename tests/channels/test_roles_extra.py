@@ -7,11 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
-from drivetwin.channels.roles import ROLES, get_extra_quantity, get_place, get_quantity, is_extra
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.roles import (
+    ROLES,
+    Quantity,
+    get_extra_quantity,
+    get_place,
+    get_quantity,
+    is_extra,
+)
 
 
 def test_each_extra_role_has_its_quantity_and_place() -> None:

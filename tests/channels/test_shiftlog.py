@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.channels.units import Unit, find_unit
 from drivetwin.errors import TimeError
 

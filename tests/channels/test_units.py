@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity
 from drivetwin.channels.units import (
     UNITS,
     find_unit,

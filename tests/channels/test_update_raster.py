@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.findings import render
-from drivetwin.logs.quality.update_raster import mark_late_samples
+from drivetwin.logs.quality.consistency_checks import mark_late_samples
 
 STEP = 1e-3
 

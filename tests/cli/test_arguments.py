@@ -8,8 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
-from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.channels.read_options import (
+    ChannelSpec,
+    ReadOptions,
+    RememberedChannel,
+    RememberedMapping,
+    TimeColumn,
+)
 from drivetwin.cli.arguments import read_twin_log
 from drivetwin.errors import MissingChannelError
 from drivetwin.twin.twin import Twin

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.time_left import Remaining
+from drivetwin.cli.output import Remaining
 from tests.cli.conftest import Files
 
 

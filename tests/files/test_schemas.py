@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_text import format_mapping
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.export.parameters.json_file import CODEC
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.files.fit_file import build_fit_file, format_fit_file

@@ -15,8 +15,13 @@ from hypothesis import strategies as st
 
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
-from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.channels.read_options import (
+    BusOptions,
+    ChannelSpec,
+    ReadOptions,
+    RememberedChannel,
+    RememberedMapping,
+)
 from drivetwin.errors import ResultFileError
 from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.twin.build import build_twin

@@ -21,8 +21,8 @@ from typing import Any
 import pytest
 
 from drivetwin.errors import StoreError
+from drivetwin.fleet.coordinator import run_fleet
 from drivetwin.fleet.events import Event, Settled
-from drivetwin.fleet.run import run_fleet
 from drivetwin.fleet.store import Store
 from tests.fleet.toys import ROOT, contents, make_logs, request, run_toys
 

@@ -18,8 +18,8 @@ from typing import Any
 import pytest
 
 from drivetwin.errors import INTERRUPTED, StoreError
+from drivetwin.fleet.coordinator import run_fleet
 from drivetwin.fleet.events import Event
-from drivetwin.fleet.run import run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import State

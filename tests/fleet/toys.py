@@ -14,9 +14,9 @@ from typing import Any
 
 from drivetwin._util.interrupts import interrupt_on_signals
 from drivetwin.estimation.result.method import Method
+from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.events import Event, Settled, Summary, to_document
 from drivetwin.fleet.rules import RulesFile, RuleTable
-from drivetwin.fleet.run import FleetRun, run_fleet
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Limits

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.mapping import Mapped
-from drivetwin.channels.roles import NEEDED
-from drivetwin.channels.shiftlog import FloatArray, Quantity, ShiftLog
+from drivetwin.channels.roles import NEEDED, Quantity
+from drivetwin.channels.shiftlog import FloatArray, ShiftLog
 from drivetwin.errors import (
     DamagedChannelError,
     FileFormatError,

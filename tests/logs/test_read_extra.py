@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
-from drivetwin.channels.shiftlog import Quantity, ShiftLog
+from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.findings import Code
 from drivetwin.logs.read import read_log
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from drivetwin._util.atomic import protect_files
-from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import FileFormatError, InputError, TimeError, UnitError
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method

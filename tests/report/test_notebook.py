@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.report.notebook import draw_figure, summarise
 from drivetwin.twin.build import build_twin

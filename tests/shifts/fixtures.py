@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.spec import ElementSpec, Gear, PriorValue

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from drivetwin.shifts.candidate import Run, detect_gear_runs
 from drivetwin.shifts.kinematics import GearboxSpeeds
-from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.shift import ShiftSettings
 
 _RATIOS = {"2": 1.9, "3": 1.4, "4": 1.0}
 _TIME = np.arange(0.0, 2.0, 1e-3)

@@ -15,8 +15,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingChannelError, TimeError
 from drivetwin.findings import Code, Number, render
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.shift import Shift, ShiftSettings
 from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.shifts.fixtures import P0_MADE, Plan, make_card, make_log
 

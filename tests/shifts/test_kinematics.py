@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError
 from drivetwin.shifts.kinematics import get_shift_pressures, is_shared_pressure
 from drivetwin.shifts.shift import Shift

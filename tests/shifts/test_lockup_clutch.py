@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray, ShiftLog
 from drivetwin.errors import IdentificationError
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.lockup_clutch import (
@@ -20,7 +21,7 @@ from drivetwin.shifts.lockup_clutch import (
     refer_to_turbine,
     require_locked_converter,
 )
-from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.vehicle_parts import Converter
 from tests.shifts.fixtures import Plan, make_card
 
 TIME = np.arange(0.0, 6.0, 0.02)

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.shiftlog import Channel, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.shifts.quality import (
     compute_command_response_time,
     compute_duration,

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray, ShiftLog
 from drivetwin.findings import render
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.tcu_flags import find_flag_spans

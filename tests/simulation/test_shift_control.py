@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.held_signal import HeldSignal
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import Signal

@@ -21,7 +21,7 @@ from drivetwin.simulation.batch import (
     simulate_batch,
     simulate_batch_sensitivities,
 )
-from drivetwin.simulation.driveline_start import build_start
+from drivetwin.simulation.driveline import build_start
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     Signal,

@@ -12,8 +12,8 @@ import pytest
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.simulation.driveline import solve_steady_speed
 from drivetwin.simulation.driveline_run import DrivelineTask, simulate
-from drivetwin.simulation.driveline_start import solve_steady_speed
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 from drivetwin.simulation.vehicle_parts import VehicleParts
 from drivetwin.vehicle.card import load_card

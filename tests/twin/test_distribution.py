@@ -14,7 +14,7 @@ from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.distribution import describe_model
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
+from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
 from tests.report.sample import SHIFT, STRIBECK, card, identification
 
 IDS = ("eta", "P0.B3")

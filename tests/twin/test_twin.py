@@ -9,8 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
-from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
+from drivetwin.channels.read_options import (
+    BusOptions,
+    ChannelSpec,
+    ReadOptions,
+    RememberedChannel,
+    RememberedMapping,
+    TimeColumn,
+)
 from drivetwin.errors import InputError, MissingParameterError, ResultFileError
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.files.twin_file import load_twin, save_twin

@@ -11,7 +11,7 @@ import pytest
 
 import drivetwin
 from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
+from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli import main
 from drivetwin.cli.synth import write_run

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import PriorValue, SensorTolerance, VehicleCard, load_card
 from tests.logs.fixtures import CARD

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import MappingError, UnitError
 from drivetwin.logs.survey import Survey

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.errors import InputError
-from drivetwin.logs.formats.parser_limits import BASE_TIME
+from drivetwin.logs.formats.guarded import BASE_TIME
 from drivetwin.workbench.jobs import call
 from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.sandboxed_parse import (

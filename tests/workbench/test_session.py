@@ -12,7 +12,7 @@ import pytest
 from drivetwin.errors import InputError, RefusedError, UnitError
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import Code, render
-from drivetwin.logs.formats import parser_limits
+from drivetwin.logs.formats import guarded
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
 from drivetwin.workbench.phases import Boundary, get_boundary_times
@@ -76,7 +76,7 @@ def test_why_an_identification_ended_early_is_kept_until_the_next(session: Sessi
 def test_a_log_is_given_up_after_the_time_for_its_size(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parser_limits, "TIME_PER_BYTE", -1.0)
+    monkeypatch.setattr(guarded, "TIME_PER_BYTE", -1.0)
     with pytest.raises(InputError, match="was stopped"):
         _open(session)
 

@@ -14,8 +14,7 @@ from enum import Enum
 from functools import cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 
 P = ParamSpec("P")
 R = TypeVar("R")

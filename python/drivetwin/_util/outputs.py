@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of commands: declared by a marker, checked before the computation."""
+"""Outputs of commands: declared by a marker, checked and locked before the computation."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -82,3 +84,57 @@ PAGE = {".html": "page with figures"}
 """Kind of an output that is a page alone."""
 LOG_ENDINGS = {".csv": "text", ".mf4": "MDF 4", ".parquet": "Parquet", ".mat": "MATLAB"}
 """Kinds of an output that is a log."""
+
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: outputs are not locked
+    fcntl = None  # type: ignore[assignment]
+
+
+@contextmanager
+def lock_outputs(paths: Iterable[Path]) -> Iterator[None]:
+    """Hold the locks of output paths inside the block; they end with the process at the latest.
+
+    Raises InputError where another command of this user, on this machine, holds one.
+    """
+    with ExitStack() as held:
+        for path in sorted({path.resolve() for path in paths}):
+            held.enter_context(_lock(path))
+        yield
+
+
+@contextmanager
+def _lock(path: Path) -> Iterator[None]:
+    if fcntl is None:
+        yield
+        return
+    import hashlib
+
+    name = hashlib.sha256(os.fsencode(path)).hexdigest()[:32]
+    file = Path(tempfile.gettempdir(), f"drivetwin-{os.getuid()}-{name}.lock")
+    handle = _acquire(file, path)
+    try:
+        yield
+    finally:
+        file.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _acquire(file: Path, path: Path) -> int:
+    """Return the open, locked file. One that its last owner removed meanwhile is made again."""
+    while True:
+        handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(handle)
+            raise InputError(
+                "another command is writing here",
+                "wait until it is through, or give another -o",
+                Where(file=str(path)),
+            ) from None
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(handle), file.stat()):
+                return handle
+        os.close(handle)

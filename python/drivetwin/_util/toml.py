@@ -14,8 +14,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from drivetwin._util.regular_file import measure_regular_file
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import InputError, Where, suggest_spelling
 
 MAX_SIZE = 4_000_000
 """Largest TOML file [bytes]."""

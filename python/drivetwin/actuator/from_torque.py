@@ -26,11 +26,9 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import integrate_trapezoids
-from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import LEAST_KISS, ActuatorSource, IdentifiedActuator
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
-from drivetwin.actuator.posterior import sample_posterior
-from drivetwin.actuator.search import Fit, Prior, Unknowns, search_actuator
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
+from drivetwin.actuator.search import Fit, Prior, Unknowns, sample_posterior, search_actuator
 from drivetwin.errors import IdentificationError
 
 

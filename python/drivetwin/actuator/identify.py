@@ -11,8 +11,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.actuator.held_signal import HeldSignal
-from drivetwin.actuator.model import QUANTITIES, REFERENCE, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, REFERENCE, ActuatorModel, HeldSignal
 from drivetwin.actuator.search import Fit, Unknowns, estimate_covariance, search_actuator
 from drivetwin.errors import IdentificationError
 

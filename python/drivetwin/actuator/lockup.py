@@ -20,11 +20,9 @@ import numpy as np
 from scipy.optimize import Bounds, differential_evolution
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
-from drivetwin.actuator.posterior import sample_posterior
-from drivetwin.actuator.search import Prior, Unknowns
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
+from drivetwin.actuator.search import Prior, Unknowns, sample_posterior
 from drivetwin.errors import IdentificationError
 
 _STEP = 2e-3

@@ -19,16 +19,15 @@ from drivetwin.authoring.answers import (
     list_elements,
     list_gears,
 )
-from drivetwin.authoring.converter import KEY, format_converter
-from drivetwin.authoring.element_questions import describe_product, find_form
+from drivetwin.authoring.element_questions import KEY, describe_product, find_form, format_converter
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
 from drivetwin.authoring.stated_number import StatedNumber
-from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.errors import CardError
+from drivetwin.vehicle.card import check_card
 from drivetwin.vehicle.card_fields import get_card_field
-from drivetwin.vehicle.check import check_card
 
 
 def format_card(

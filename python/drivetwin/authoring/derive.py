@@ -19,9 +19,9 @@ from drivetwin.authoring.gearboxes import reduce_gears
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
 from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.errors import CardError, Where
-from drivetwin.plausibility.settings import PLAUSIBILITY
-from drivetwin.vehicle.check import RATIO_TOLERANCE
-from drivetwin.vehicle.distribution import describe_wheel_radius
+from drivetwin.plausibility.entries import PLAUSIBILITY
+from drivetwin.vehicle.card import RATIO_TOLERANCE
+from drivetwin.vehicle.spec import describe_wheel_radius
 
 GEOMETRY = frozenset((
     "surfaces", "derating", "area_m2", "radius_m", "outer_mm", "inner_mm", "piston_outer_mm",

@@ -11,24 +11,31 @@ import numpy as np
 from drivetwin.authoring.answers import Answers, get_value, list_gears
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.stated_number import StatedNumber
-from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
+from drivetwin.channels.roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import BAR
 from drivetwin.errors import DrivetwinError
-from drivetwin.plausibility.friction import FrictionProduct, find_products
-from drivetwin.plausibility.inertias import estimate_engine_inertia, estimate_vehicle_inertia
-from drivetwin.plausibility.settings import Limits
+from drivetwin.plausibility.entries import Limits
+from drivetwin.plausibility.friction import (
+    FrictionProduct,
+    estimate_engine_inertia,
+    estimate_vehicle_inertia,
+    find_products,
+)
+from drivetwin.shifts.breakaway_lockup import locate_torque_dip, smooth_channel
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.torque_onset import locate_torque_dip, smooth_channel
 from drivetwin.vehicle.card_fields import get_card_field
-from drivetwin.vehicle.distribution import (
+from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import (
+    ElementKind,
+    ElementSpec,
+    Gear,
+    PriorValue,
     describe_assumed_gain,
     describe_fill_pressure,
     describe_inertia,
 )
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 USUAL_FILL = PriorValue(0.8 * BAR, 0.4 * BAR)
@@ -140,12 +147,6 @@ def make_provisional_card(answers: Answers) -> VehicleCard:
         ),
         J_out=None if J_out is None else J_out.to_prior(describe_inertia),
     )
-
-
-def _get_range(answers: Answers, part: str) -> Limits:
-    """Return the range of an inertia, the usual one as long as it is unknown."""
-    stated: Limits | None = get_value(answers, "inertia", part)
-    return get_card_field("inertia", part).usual if stated is None else stated
 
 
 def _make_element(answers: Answers, name: str, ratio: float) -> ElementSpec:

@@ -12,13 +12,12 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.authoring.stated_number import StatedNumber
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped, make_spec, select_free
 from drivetwin.channels.names import load_name_table, normalise_name
-from drivetwin.channels.pressure_roles import get_pressure_element, make_pressure_role
-from drivetwin.channels.read_options import Column
+from drivetwin.channels.read_options import ChannelSpec, Column
 from drivetwin.channels.recognition import WHOLE_WORD, infer_candidates
-from drivetwin.channels.shiftlog import Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity, get_pressure_element, make_pressure_role
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import MissingChannelError, TimeError
 from drivetwin.findings import Code
@@ -26,10 +25,10 @@ from drivetwin.logs.open_mapped import open_stated
 from drivetwin.logs.quality.time_alignment import estimate_final_drive, estimate_speed_ratio
 from drivetwin.logs.raw import Remembered
 from drivetwin.logs.read import Demands, read_recording
+from drivetwin.plausibility.entries import PLAUSIBILITY
 from drivetwin.plausibility.ratios import find_held_ratios
-from drivetwin.plausibility.settings import PLAUSIBILITY
 from drivetwin.shifts.kinematics import GearboxSpeeds, resample_geared
-from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.shift import ShiftSettings
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ElementSpec, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard

@@ -6,13 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from drivetwin._util.spelling import suggest_spelling
 from drivetwin.authoring.answers import Answer, Key
 from drivetwin.authoring.derive import GEOMETRY, derive_answers
 from drivetwin.authoring.parsing import Parser
 from drivetwin.authoring.question import make_parser
 from drivetwin.authoring.questions import SENSOR_ROLES, Sources, iterate_questions
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.vehicle.card_fields import list_single_options, read_card_fields
 
 ORDER: dict[str, Key] = {option: field.key for option, field in list_single_options().items()}

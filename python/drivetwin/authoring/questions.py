@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, Origin, get_value
-from drivetwin.authoring.converter import KEY, parse_converter
-from drivetwin.authoring.element_questions import iterate_element_questions
+from drivetwin.authoring.element_questions import KEY, iterate_element_questions, parse_converter
 from drivetwin.authoring.gearboxes import (
     GearboxFit,
     list_forward_gears,
@@ -28,10 +27,10 @@ from drivetwin.authoring.sensor_classes import (
     read_sensor_classes,
 )
 from drivetwin.authoring.stated_number import StatedNumber
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.errors import CardError
 from drivetwin.gearbox import list_builtin_gearboxes
-from drivetwin.vehicle.distribution import MASS_STD
+from drivetwin.vehicle.spec import MASS_STD
 
 INERTIA_MARGIN = 1.25
 """Factor by which a range estimated from a log is widened to both sides."""

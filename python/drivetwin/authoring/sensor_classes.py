@@ -11,9 +11,7 @@ from pathlib import Path
 from pydantic import Field, RootModel
 
 from drivetwin._util.toml import StrictModel, read_toml
-from drivetwin.channels.pressure_roles import get_pressure_element
-from drivetwin.channels.roles import get_quantity
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity, get_pressure_element, get_quantity
 from drivetwin.errors import CardError
 
 _TABLE = Path(__file__).with_suffix(".toml")

@@ -11,8 +11,7 @@ from itertools import pairwise
 
 from drivetwin._util.toml import WrittenNumber, format_text
 from drivetwin.authoring.parsing import parse_bounded, split_list
-from drivetwin.vehicle.distribution import describe_ratio, parse_teeth
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, describe_ratio, parse_teeth
 
 PLUS_MINUS = r"\+/?-|±"
 COMPUTED_DIGITS = 6

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.calibration.certificate import Certificate, certify
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.keep_limits import TOLERANCE, Repair

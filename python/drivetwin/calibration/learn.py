@@ -39,7 +39,7 @@ from drivetwin.estimation.optimize.gauss_newton import GaussNewtonSettings, Opti
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import LEAD
 from drivetwin.simulation.driveline import Driveline
-from drivetwin.simulation.part_parameters import REFERENCE
+from drivetwin.simulation.vehicle_parts import REFERENCE
 from drivetwin.twin.twin import CAPACITY_REFERENCE, Twin
 
 

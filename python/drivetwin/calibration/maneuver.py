@@ -19,9 +19,10 @@ from drivetwin.simulation.driveline import (
     Driveline,
     VehicleBody,
     build_driveline,
+    build_start,
+    compute_twist,
     find_body,
 )
-from drivetwin.simulation.driveline_start import build_start, compute_twist
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Signal, State
 from drivetwin.simulation.network import Element, Start
 from drivetwin.simulation.shift_control import ControlledNetwork, ControlledUnit

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.calibration.calibrate import (
     Assessment,
     Calibration,

@@ -18,7 +18,7 @@ from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, V
 from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.part_parameters import PROGRESSION, TYRE_SLIP
+from drivetwin.simulation.vehicle_parts import PROGRESSION, TYRE_SLIP
 from drivetwin.twin.distribution import collect_covariance, has_possible_parts
 from drivetwin.twin.friction_law import (
     build_partner_spread,
@@ -28,8 +28,8 @@ from drivetwin.twin.friction_law import (
     to_values,
 )
 from drivetwin.twin.twin import CAPACITY_SLOPE, PRESSURE_DELAY, SIMULATED, TORQUE_LAG, Twin
-from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
 from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
 
 
 @dataclass(frozen=True, eq=False)

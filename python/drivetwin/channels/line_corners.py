@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, remember_for_arrays
 from drivetwin._util.signal_processing import estimate_rounding_step, find_true_runs
-from drivetwin._util.time_steps import remember_for_arrays
 
 PRIOR = float(np.log(1e4))
 """Logarithm of the prior odds against a filled channel: one in ten thousand measured ones may be

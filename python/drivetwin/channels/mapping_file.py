@@ -11,12 +11,16 @@ from typing import Generic, Literal, TypeVar
 from pydantic import Field
 
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.names import normalise_name
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
-from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
-from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES
+from drivetwin.channels.read_options import BusOptions, ChannelSpec, ReadOptions, TimeColumn
+from drivetwin.channels.roles import (
+    EXTRA_ROLES,
+    PLACED_ROLES,
+    ROLES,
+    make_command_role,
+    make_pressure_role,
+)
 from drivetwin.errors import MappingError, Where
 
 PROJECT_MAPPING = "channels.toml"

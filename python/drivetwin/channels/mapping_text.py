@@ -12,12 +12,9 @@ from dataclasses import dataclass, field
 
 from drivetwin._util.toml import format_key, format_text
 from drivetwin._util.visible_text import escape_line
-from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.pressure_roles import get_element
-from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.roles import get_place, get_quantity
-from drivetwin.channels.unit_proposals import Proposal
-from drivetwin.channels.units import list_first_spellings
+from drivetwin.channels.read_options import ChannelSpec, ReadOptions
+from drivetwin.channels.roles import get_element, get_place, get_quantity
+from drivetwin.channels.units import Proposal, list_first_spellings
 
 _HEAD = (
     "Channel mapping: which column is what to the driveline.",

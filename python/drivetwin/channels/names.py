@@ -13,11 +13,10 @@ from pathlib import Path
 
 from pydantic import Field
 
-from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import StrictModel, read_toml
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import find_unit, is_time_unit, is_unit
-from drivetwin.errors import MappingError, MissingChannelError, Where
+from drivetwin.errors import MappingError, MissingChannelError, Where, suggest_spelling
 
 _FILE = Path(__file__).with_name("names.toml")
 

@@ -12,10 +12,17 @@ from functools import cache
 from itertools import chain
 
 from drivetwin.channels.names import NameTable, load_name_table, normalise_name
-from drivetwin.channels.pressure_roles import get_element, make_command_role, make_pressure_role
 from drivetwin.channels.read_options import Column
-from drivetwin.channels.roles import EXTRA_ROLES, get_extra_quantity, get_quantity, is_extra
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import (
+    EXTRA_ROLES,
+    Quantity,
+    get_element,
+    get_extra_quantity,
+    get_quantity,
+    is_extra,
+    make_command_role,
+    make_pressure_role,
+)
 from drivetwin.channels.units import find_unit
 
 WHOLE_WORD = 3

@@ -7,8 +7,60 @@ them, and a damaged one is left out with a finding.
 
 from __future__ import annotations
 
-from drivetwin.channels.pressure_roles import get_element
-from drivetwin.channels.shiftlog import Quantity
+from enum import StrEnum
+
+_PREFIX, _COMMAND = "pressure.", "pressure_command."
+
+
+class Quantity(StrEnum):
+    """Physical quantity of a channel; determines its SI unit and interpolation."""
+
+    TORQUE = "torque"
+    PRESSURE = "pressure"
+    SPEED = "speed"
+    FRACTION = "fraction"  # pedal, percent torque
+    TEMPERATURE = "temperature"
+    STATE = "state"  # integers: gear, flags; held, never interpolated
+
+    @property
+    def unit(self) -> str:
+        """SI unit in ASCII, as parameters have it."""
+        return _SI.get(self, "1")
+
+
+_SI = {
+    Quantity.TORQUE: "N*m",
+    Quantity.PRESSURE: "Pa",
+    Quantity.SPEED: "rad/s",
+    Quantity.TEMPERATURE: "K",
+}
+
+
+def make_pressure_role(element: str) -> str:
+    """Return the role of the pressure of a clutch or brake by its name on the card."""
+    return _PREFIX + element
+
+
+def get_pressure_element(role: str) -> str | None:
+    """Return the element whose pressure a role is; None for the role of another quantity."""
+    return role.removeprefix(_PREFIX) if role.startswith(_PREFIX) else None
+
+
+def make_command_role(element: str) -> str:
+    """Return the role of the commanded pressure of a clutch or brake by its name on the card."""
+    return _COMMAND + element
+
+
+def get_command_element(role: str) -> str | None:
+    """Return the element whose commanded pressure a role is; None for another role."""
+    return role.removeprefix(_COMMAND) if role.startswith(_COMMAND) else None
+
+
+def get_element(role: str) -> str | None:
+    """Return the element whose pressure or commanded pressure a role is; None for another role."""
+    element = get_pressure_element(role)
+    return get_command_element(role) if element is None else element
+
 
 EXTRA_ROLES = {"motor_torque": Quantity.TORQUE, "motor_speed": Quantity.SPEED}
 """Roles that exist once."""

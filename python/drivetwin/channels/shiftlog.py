@@ -5,18 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.rich_display import DisplayMixin
-from drivetwin._util.time_steps import compute_median_step, remember_for_arrays
-from drivetwin.channels.channel_spec import RememberedMapping
 from drivetwin.channels.filling import Filling
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.read_options import RememberedMapping
+from drivetwin.channels.roles import Quantity, make_pressure_role
 from drivetwin.channels.update_raster import UpdateRaster, find_raster, find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.findings import Finding
@@ -52,30 +51,6 @@ def find_pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
     """Gaps between samples at `time` (n,): from the last sample before to the first one after."""
     wide = np.flatnonzero(np.diff(time) > compute_gap_limit(time))
     return tuple((float(time[i]), float(time[i + 1])) for i in wide)
-
-
-class Quantity(StrEnum):
-    """Physical quantity of a channel; determines its SI unit and interpolation."""
-
-    TORQUE = "torque"
-    PRESSURE = "pressure"
-    SPEED = "speed"
-    FRACTION = "fraction"  # pedal, percent torque
-    TEMPERATURE = "temperature"
-    STATE = "state"  # integers: gear, flags; held, never interpolated
-
-    @property
-    def unit(self) -> str:
-        """SI unit in ASCII, as parameters have it."""
-        return _SI.get(self, "1")
-
-
-_SI = {
-    Quantity.TORQUE: "N*m",
-    Quantity.PRESSURE: "Pa",
-    Quantity.SPEED: "rad/s",
-    Quantity.TEMPERATURE: "K",
-}
 
 
 @dataclass(frozen=True, eq=False)

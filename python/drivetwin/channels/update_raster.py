@@ -18,8 +18,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.time_steps import (
+from drivetwin._util.arrays import (
+    FloatArray,
     compute_median_step,
     is_time_axis,
     remember_for_arrays,

@@ -109,7 +109,7 @@ def read_twin_log(
 
     Units and options that come from the twin are shown. Raises the typed errors of the readers.
     """
-    from drivetwin.channels.recall import RECALLED
+    from drivetwin.channels.mapping import RECALLED
     from drivetwin.cli.output import show_findings, show_step
     from drivetwin.logs.read import read_log
 

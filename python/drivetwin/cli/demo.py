@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drivetwin._util.display_units import format_uncertainty, get_display_unit
 from drivetwin._util.request import output_folder
 from drivetwin.cli.arguments import REPORT
 from drivetwin.cli.output import print_blocks, print_json, print_line, print_paragraph
@@ -19,6 +20,31 @@ from drivetwin.report.blocks import Column, TableBlock, make_table
 if TYPE_CHECKING:
     from drivetwin.dyno.truth import Truth
     from drivetwin.estimation.identification import Identification
+
+Interval = tuple[float, float]
+
+_EXACT = 1e-5
+"""Relative half width below which a value is printed as exact."""
+
+
+def format_estimate(
+    value: float | None, interval: Interval | None, si_unit: str
+) -> tuple[str, str, str]:
+    """Value, `± half width` of its interval, and the unit they are in; a dash for None."""
+    display = get_display_unit(si_unit)
+    if value is None:
+        return "–", "", display.label
+    half = None if interval is None else (interval[1] - interval[0]) / 2.0 * display.factor
+    if half is not None and half < _EXACT * abs(value * display.factor):
+        half = None
+    number, width = format_uncertainty(value * display.factor, half)
+    return number, f"± {width}" if width else "", display.label
+
+
+def format_deviation(value: float | None, truth: float) -> str:
+    """Format the deviation from the true value in percent; empty if undefined."""
+    return "" if value is None or truth == 0.0 else f"{100.0 * (value / truth - 1.0):+z.2f}"
+
 
 _METHODS = (DEFAULT_METHOD, Method.PAPER)
 _SLIPS = (10.0, 30.0, 50.0, 80.0)
@@ -142,7 +168,6 @@ def _get_friction(found: Identification, element: str, slip: float) -> _Found:
 
 def _build_table(rows: list[_Row], scenario: ScenarioName) -> TableBlock:
     """Truth, and value, interval and deviation of both methods."""
-    from drivetwin.cli.numbers import format_deviation, format_estimate
 
     lines = []
     for row in rows:

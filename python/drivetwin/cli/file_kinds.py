@@ -13,8 +13,6 @@ from drivetwin._util.toml import MAX_SIZE, parse_toml
 from drivetwin.cli.arguments import TWIN
 from drivetwin.errors import CardError, FileFormatError, InputError, ResultFileError, Where
 
-_HEAD = 8192
-"""Number of bytes by which a log is recognised."""
 _TOML_LINE = re.compile(r"""^\s*(?:[\w."'-]+\s*=|\[+[\w."' -]+\]+\s*(?:#.*)?$)""")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _MAKE_TWIN = "'drivetwin identify LOG --vehicle CARD -o DIR' writes the twin, DIR/twin.toml"
@@ -92,11 +90,12 @@ def require_kind(path: Path, wanted: FileRole) -> None:
 def recognise_file(path: Path) -> FileRole:
     """Recognise the kind of a file from its content; its name does not matter."""
     from drivetwin.logs.formats.detect import is_binary_log
+    from drivetwin.logs.raw import HEAD_BYTES
 
     if not path.is_file():
         return FileRole.OTHER
     with path.open("rb") as file:
-        head = file.read(_HEAD)
+        head = file.read(HEAD_BYTES)
     if is_binary_log(head):
         return FileRole.LOG
     text = head.decode("utf-8-sig", errors="replace")

@@ -61,8 +61,8 @@ def run(request: RunFleet) -> None:
     The same command continues an interrupted run; finished logs are not computed again.
     """
     from drivetwin.cli.fleet_view import show_progress
+    from drivetwin.fleet.coordinator import FleetRun, run_fleet
     from drivetwin.fleet.rules import read_rules
-    from drivetwin.fleet.run import FleetRun, run_fleet
     from drivetwin.fleet.sources import Sources
 
     if not request.logs and request.listed is None:

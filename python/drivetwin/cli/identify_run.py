@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivetwin._util.progress import TimedStages
 from drivetwin._util.request import option
-from drivetwin._util.timed_stages import TimedStages
 from drivetwin.cli.arguments import REPORT, RESULT, TWIN, CardInput, find_mapping, method_option
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step

@@ -14,8 +14,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 
 from drivetwin._util.atomic import protect_files, remove_unfinished
-from drivetwin._util.output_lock import lock_outputs
-from drivetwin._util.outputs import Output
+from drivetwin._util.outputs import Output, lock_outputs
 from drivetwin._util.request import Argument, FileRole, Request, get_arguments, spell_option
 
 Command = Callable[..., None]

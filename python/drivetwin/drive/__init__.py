@@ -14,10 +14,14 @@ from drivetwin.drive.plan import (
     plan_coast_down,
     plan_launch,
 )
-from drivetwin.drive.powertrain import Powertrain
+from drivetwin.drive.powertrain import (
+    Powertrain,
+    list_builtin_powertrains,
+    load_powertrain,
+    select_powertrain,
+)
 from drivetwin.drive.result import DriveRun
 from drivetwin.drive.run import run
-from drivetwin.drive.schema import list_builtin_powertrains, load_powertrain, select_powertrain
 
 __all__ = [
     "DriveRun",

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.signal_processing import apply_lag
-from drivetwin.actuator.held_signal import HeldSignal
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.errors import InputError, Where
 
 FloatArray = NDArray[np.float64]

@@ -1,35 +1,142 @@
 # SPDX-License-Identifier: MIT
-"""Run the virtual dynamometer: scenario and seed in, recorded channels and their truth out."""
+"""Run the virtual dynamometer: scenario and seed in, recorded channels and their truth out.
+
+A run may have effects that the dual-clutch model leaves out.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
+from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.actuators import ControlledActuator
 from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects, check_effects
-from drivetwin.dyno.mismatched_run import (
-    apply_effects,
-    changes_motion,
-    delay_output_torque,
-    simulate_with_effects,
-)
-from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.scenario import Scenario, Sensor
 from drivetwin.dyno.truth import Truth, compute_truth
 from drivetwin.errors import InputError, SimulationError, Where
-from drivetwin.estimation.likelihood.effects.synthetic_vehicle import NominalRun, TorqueError
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
+    NominalRun,
+    SyntheticVehicle,
+    TorqueError,
+    compute_friction_work,
+)
+from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.simulation.driveline_run import DrivelineTask
-from drivetwin.simulation.dual_clutch import Signal, Trajectory
+from drivetwin.simulation.dual_clutch import FloatArray, Signal, Trajectory
 from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
+from drivetwin.vehicle.effects import EffectId
 
-FloatArray = NDArray[np.float64]
+_ROUNDS = 30
+"""Most runs until friction work and the friction that falls with it agree."""
+_AGREEMENT = 1e-9
+"""Change of the friction work between two runs, over its total, at which they agree."""
+_ROLE = "output_torque"
+
+
+def changes_motion(scenario: Scenario, effects: Effects) -> bool:
+    """Return whether an effect changes the motion, and not the sensors alone.
+
+    Raises InputError where it does and the scenario is none of a plain dual clutch.
+    """
+    moving = [name for name in effects if name not in SENSOR_EFFECTS]
+    if moving and not (scenario.plant is None and scenario.converter is None):
+        raise InputError(
+            f"{', '.join(moving)} in scenario {scenario.name!r}, "
+            "which has a whole gearbox or an open converter",
+            f"choose a scenario of a dual clutch, or any of {', '.join(sorted(SENSOR_EFFECTS))}",
+            Where(key="effect"),
+        )
+    return bool(moving)
+
+
+def delay_output_torque(
+    sensors: tuple[Sensor, ...], error: TorqueError, effects: Effects
+) -> tuple[Sensor, ...]:
+    """Return the sensors with the delay of the output torque.
+
+    Raises InputError for an effect in a sensor that is absent.
+    """
+    wanted = [name for name in SENSOR_EFFECTS if effects.get(name, 0.0) > 0.0]
+    if wanted and _ROLE not in [sensor.role for sensor in sensors]:
+        raise InputError(
+            f"{', '.join(sorted(wanted))}: the scenario records no output torque",
+            "choose a scenario with an output torque sensor",
+            Where(key="effect"),
+        )
+    return tuple(
+        replace(one, delay=one.delay + error.delay) if one.role == _ROLE else one for one in sensors
+    )
+
+
+def apply_effects(
+    nominal: NominalRun,
+    effects: Effects,
+    gears: Sequence[str],
+    seed: int,
+    heated: Trajectory | None = None,
+) -> SyntheticVehicle:
+    """Apply the effects to the vehicle of a scenario.
+
+    Parameters
+    ----------
+    nominal
+        Run without effects.
+    effects
+        Sizes, see `EFFECTS`.
+    gears
+        Shift elements in the order of the gears.
+    seed
+        Seed of the random effects.
+    heated
+        Run on the times of the nominal one, from whose friction work μ falls; the nominal one by
+        default.
+
+    Returns
+    -------
+    SyntheticVehicle
+        Vehicle of the scenario with the effects.
+    """
+    vehicle = SyntheticVehicle.from_nominal(nominal, gears, seed, heated)
+    for name, effect in EFFECTS.items():
+        if effects.get(name, 0.0) > 0.0:
+            vehicle = effect.apply(vehicle, effects[name])
+    return vehicle
+
+
+def simulate_with_effects(
+    scenario: Scenario, nominal: NominalRun, effects: Effects, seed: int, time: FloatArray
+) -> Trajectory:
+    """Simulate the scenario with `effects` on `time` (n,) [s].
+
+    μ that falls with the friction work is found by repetition: each run has the friction of the
+    work of the run before it. A failed run returns its status.
+    Raises SimulationError where the repetition does not converge.
+    """
+    gears, start = [gear.element for gear in scenario.gears], scenario.start()
+    heated = nominal.trajectory
+    for _ in range(_ROUNDS):
+        vehicle = apply_effects(nominal, effects, gears, seed, heated)
+        if effects.get(EffectId.FRICTION_HEAT, 0.0) == 0.0:
+            return vehicle.simulate(start, time)
+        run = vehicle.simulate(start, heated.time)
+        if run.status != "completed" or _compute_change(run, heated) < _AGREEMENT:
+            return apply_effects(nominal, effects, gears, seed, run).simulate(start, time)
+        heated = run
+    raise SimulationError(
+        f"friction and its work do not agree after {_ROUNDS} runs",
+        f"give a smaller {EffectId.FRICTION_HEAT}",
+    )
+
+
+def _compute_change(run: Trajectory, before: Trajectory) -> float:
+    """Compute the largest change of the friction work of any element, over its total."""
+    works = [(compute_friction_work(run, n), compute_friction_work(before, n)) for n in run.slip]
+    return max(float(np.max(np.abs(a - b)) / max(float(b[-1]), 1.0)) for a, b in works)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 
 from drivetwin._util.csv_text import format_csv_row
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.dyno import DynoRun

@@ -10,8 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from drivetwin.gearbox import Gearbox, build_network_elements, reduce, solve_gear
-from drivetwin.gearbox.dual import build_shift_element
-from drivetwin.gearbox.reduction import ElementRatios
+from drivetwin.gearbox.reduction import ElementRatios, build_shift_element
 from drivetwin.gearbox.spec import GROUND
 from drivetwin.simulation.driveline import (
     ENGINE,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenario of the virtual dynamometer: driveline, driver, TCU, actuators, sensors."""
+"""Scenario of the virtual dynamometer: driveline, driver, TCU, actuators, noisy sensors."""
 
 from __future__ import annotations
 
@@ -7,17 +7,63 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.actuators import Actuator, ControlledActuator, Program
 from drivetwin.dyno.plant import Plant
-from drivetwin.dyno.sensors import Sensor
 from drivetwin.errors import InputError, Where
-from drivetwin.simulation.driveline_start import solve_steady_speed
-from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, State
+from drivetwin.simulation.driveline import solve_steady_speed
+from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, ShiftElement, State
 from drivetwin.simulation.vehicle_parts import OpenConverter
 
-FloatArray = NDArray[np.float64]
+LOOKS = 20
+"""Instants per averaging window; the error of the mean falls with their square."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One channel of the log.
+
+    `column` and `unit` are those of the file; everything else is SI. A sample is the quantity at
+    its time stamp minus `delay` [s], plus white noise of `noise` (1 σ), rounded to a multiple of
+    `resolution` (0: not rounded). `rate` in Hz; a rate below the logger's gives held values.
+    """
+
+    role: str
+    quantity: Quantity
+    column: str
+    unit: str
+    rate: float
+    noise: float
+    resolution: float = 0.0
+    delay: float = 0.0
+    window: float = 0.0
+    """Time [s] before the stamp over which a sample is the mean, as encoders on a bus send it."""
+
+    def compute_instants(self, stamps: FloatArray) -> FloatArray:
+        """Instants (n, m) [s] that each sample averages; none before 0."""
+        if self.window == 0.0:
+            before = np.zeros(1)
+        else:
+            before = self.window * (np.arange(LOOKS) + 0.5) / LOOKS
+        return np.maximum(stamps[:, None] - self.delay - before, 0.0)
+
+    def compute_stamps(self, duration: float) -> FloatArray:
+        """Time stamps (n,) [s] from 0 to `duration`, exact multiples of the period."""
+        return np.arange(int(np.floor(duration * self.rate + 1e-9)) + 1) / self.rate
+
+    def read(
+        self, stamps: FloatArray, exact: FloatArray, noise: float, rng: np.random.Generator
+    ) -> Channel:
+        """The recorded channel from the `exact` quantity (n,) at `stamps - delay`.
+
+        `noise` scales the white noise; at 0 the sensor is ideal and does not round either.
+        """
+        values = exact + noise * self.noise * rng.standard_normal(exact.size)
+        if noise > 0.0 and self.resolution > 0.0:
+            values = self.resolution * np.round(values / self.resolution)
+        return Channel(self.role, self.quantity, stamps, values, self.column, self.unit)
 
 
 @dataclass(frozen=True)

@@ -27,13 +27,11 @@ from typing import Any
 
 from drivetwin._util.toml import read_toml
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity, make_command_role, make_pressure_role
 from drivetwin.dyno.actuators import Actuator, ControlledActuator, Fill, Program, Vibration
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.plant import Plant, build_form, build_plant
-from drivetwin.dyno.scenario import HeldGear, Scenario, TorqueReduction
-from drivetwin.dyno.sensors import Sensor
+from drivetwin.dyno.scenario import HeldGear, Scenario, Sensor, TorqueReduction
 from drivetwin.errors import InputError, Where
 from drivetwin.gearbox import load_gearbox
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck

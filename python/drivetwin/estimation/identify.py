@@ -13,7 +13,7 @@ from typing import Any
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import DesignData, PreparedLog
@@ -25,10 +25,13 @@ from drivetwin.estimation.paper.pipeline import (
     identify_paper_shift,
 )
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
-from drivetwin.estimation.result.friction_verdict import complete_friction, report_assumed_gains
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
-from drivetwin.estimation.result.verdict import apply_errors
+from drivetwin.estimation.result.verdict import (
+    apply_errors,
+    complete_friction,
+    report_assumed_gains,
+)
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.shifts.coverage import AFTER, BEFORE

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from drivetwin.estimation import identification
 from drivetwin.estimation.data import noise, segments, select_shifts
 from drivetwin.estimation.likelihood import coloured_noise, objective, priors
 from drivetwin.estimation.likelihood import pipeline as likelihood
@@ -15,29 +16,28 @@ from drivetwin.estimation.likelihood.noise import residual_covariance
 from drivetwin.estimation.likelihood.optimize import (
     initial_guess,
     multistart,
-    staged_start,
 )
 from drivetwin.estimation.linear import (
-    combine_shifts,
     estimates,
     friction_points,
     load_balance,
     momentum_balance,
     ringdown,
 )
+from drivetwin.estimation.linear import pipeline as integral
 from drivetwin.estimation.optimize import gauss_newton
-from drivetwin.estimation.result import multi_log, prior_conflict, verdict
+from drivetwin.estimation.result import prior_conflict, verdict
 from drivetwin.estimation.result.method import Method
 
 _LINEAR = (
     *(noise, select_shifts, segments, momentum_balance, load_balance, ringdown, friction_points),
-    *(combine_shifts, gauss_newton, estimates, verdict, prior_conflict),
+    *(integral, gauss_newton, estimates, verdict, prior_conflict),
 )
 """Stages of the integral method, with which the likelihood method starts."""
 _LIKELIHOOD = (
     *(likelihood, shift_record, input_smoothing, priors, initial_guess),
-    *(staged_start, multistart, objective, residual_covariance, coloured_noise),
-    *(causes, joint_step, correction, multi_log),
+    *(multistart, objective, residual_covariance, coloured_noise),
+    *(causes, joint_step, correction, identification),
 )
 """Stages that the likelihood method adds."""
 

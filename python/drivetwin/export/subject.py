@@ -10,8 +10,7 @@ import numpy as np
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, State
-from drivetwin.simulation.part_parameters import describe_parts
-from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
+from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts, describe_parts
 from drivetwin.twin.twin import Twin, build_nominal_shift
 
 DEFAULT_ENGINE_SPEED = 150.0

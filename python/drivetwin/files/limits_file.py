@@ -11,13 +11,12 @@ from typing import Annotated
 from pydantic import Field, FiniteFloat
 from scipy.constants import zero_Celsius
 
-from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.oil import FRICTION_SLOPE, FRICTION_SLOPE_STD, OilFriction
 from drivetwin.calibration.spread import Spread
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.files.records import Record
 
 _SUFFIX = {

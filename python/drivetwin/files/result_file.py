@@ -13,9 +13,8 @@ from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Identification, LogShare
 from drivetwin.estimation.result.method import Method, ModelStatus
-from drivetwin.estimation.result.multi_log import LogShare
 from drivetwin.estimation.result.validation import HeldOut, Outcome
 from drivetwin.files.records import (
     ActuatorRecord,

@@ -31,8 +31,8 @@ class FileKind(StrEnum):
 
 _MODELS = {
     FileKind.VEHICLE_CARD: ("vehicle.schema", "CardFile"),
-    FileKind.GEARBOX_CARD: ("gearbox.schema", "GearboxFile"),
-    FileKind.POWERTRAIN: ("drive.schema", "PowertrainFile"),
+    FileKind.GEARBOX_CARD: ("gearbox.card", "GearboxFile"),
+    FileKind.POWERTRAIN: ("drive.powertrain", "PowertrainFile"),
     FileKind.CHANNEL_MAPPING: ("channels.mapping_file", "MappingFile"),
     FileKind.FLEET_RULES: ("fleet.rules", "RulesFile"),
     FileKind.RESULT: ("files.result_file", "ResultFile"),

@@ -15,11 +15,16 @@ from pydantic import Field, FiniteFloat, field_validator
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
-from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import Fault, parse_toml, raise_faults
-from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
-from drivetwin.channels.read_options import BusOptions, ReadOptions, TimeColumn
-from drivetwin.errors import InputError, ResultFileError
+from drivetwin.channels.read_options import (
+    BusOptions,
+    ChannelSpec,
+    ReadOptions,
+    RememberedChannel,
+    RememberedMapping,
+    TimeColumn,
+)
+from drivetwin.errors import InputError, ResultFileError, suggest_spelling
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.records import (
     ActuatorRecord,
@@ -34,9 +39,9 @@ from drivetwin.files.records import (
     read_record,
 )
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.simulation.converter_map import Converter
+from drivetwin.simulation.vehicle_parts import Converter
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
-from drivetwin.vehicle.check import RATIO_TOLERANCE
+from drivetwin.vehicle.card import RATIO_TOLERANCE
 from drivetwin.vehicle.spec import ElementKind
 
 TWIN_SCHEMA = "drivetwin/twin-2"

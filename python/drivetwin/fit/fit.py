@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import IdentificationError, InputError
+from drivetwin.errors import IdentificationError, InputError, suggest_spelling
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
@@ -23,7 +22,7 @@ from drivetwin.fit.starts import drop_redundant_speeds, guess_start, list_starts
 from drivetwin.fit.term import NetworkTerm, Plant
 from drivetwin.fit.unknown import SoughtNumber, require_known_places, resolve_unknown
 from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
-from drivetwin.simulation.input_value import make_input
+from drivetwin.simulation.network import make_input
 
 _DELAY_REACH = 5.0
 """Standard deviations of its prior by which a delay may be off."""

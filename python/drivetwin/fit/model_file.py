@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import (
     Fault,
     StrictModel,
@@ -21,9 +20,9 @@ from drivetwin._util.toml import (
     read_toml,
     validate_schema,
 )
-from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES, get_quantity
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
 from drivetwin.fit.starts import list_starts

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from drivetwin.fit.unknown import Unknown
-from drivetwin.simulation.input_value import InputValue
-from drivetwin.simulation.network import Element, Output, Start
+from drivetwin.simulation.network import Element, InputValue, Output, Start
 
 
 @dataclass(frozen=True, eq=False)

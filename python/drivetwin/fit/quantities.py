@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast, get_args
 
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.channels.shiftlog import Quantity
-from drivetwin.errors import InputError
+from drivetwin.channels.roles import Quantity
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.simulation.element_schema import list_inputs
 from drivetwin.simulation.network import Output, OutputKind
 

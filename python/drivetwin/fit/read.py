@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import make_spec
-from drivetwin.channels.read_options import Column
+from drivetwin.channels.read_options import ChannelSpec, Column
 from drivetwin.channels.recognition import find_candidates
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.estimation.data.noise import prepare_signal

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.channel_spec import ChannelSpec
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.roles import Quantity
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.optimize.objective import ParameterVector

@@ -8,8 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.parameters import ParameterSpec
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind
 

@@ -19,8 +19,7 @@ from uuid import uuid4
 from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.errors import SchedulerError, Where
 from drivetwin.fleet.events import Listener, Noted
-from drivetwin.fleet.guarded_worker import GuardedWorker
-from drivetwin.fleet.pool import AHEAD
+from drivetwin.fleet.pool import AHEAD, GuardedWorker
 from drivetwin.fleet.task import Reply, Task, WorkerLost, WorkerSpec
 
 _FIRST_CONTACT = 10.0

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The one process that leads a run: it gives out tasks, writes the index, and loses nothing."""
+"""The one process that leads a run: it gives out tasks, writes the index, and loses nothing.
+
+Its workers are processes of this machine, or of a cluster.
+"""
 
 from __future__ import annotations
 
@@ -7,25 +10,30 @@ import heapq
 from collections import Counter
 from collections.abc import Generator
 from contextlib import closing
+from pathlib import Path
 from time import monotonic
 
 from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.events import Listener, Retried, Settled, Started, Summary
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.options import FleetOptions
-from drivetwin.fleet.pool import Pool
+from drivetwin.fleet.pool import LocalPool, Pool, count_usable_cores
+from drivetwin.fleet.rules import RulesFile
 from drivetwin.fleet.scan import Scan, Scanned, Skipped, make_settings_document
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import (
+    IDENTIFY,
     Aborted,
     Completed,
+    Limits,
     Outcome,
     Reply,
     State,
     Task,
     TaskSpec,
     WorkerLost,
+    WorkerSpec,
 )
 
 _COMMIT_EVERY = 1.0
@@ -237,3 +245,39 @@ def _make_quarantine_outcome(tries: int, reason: str) -> Outcome:
         remedy="try 'drivetwin identify' on the log; run again with --retry if the machine was "
         "to blame",
     )
+
+
+class FleetRun(FleetOptions):
+    """Request of a fleet run: files, rules, folder of the store, and options.
+
+    `function` identifies a log; see `WorkerSpec`.
+    """
+
+    sources: Sources
+    rules: RulesFile
+    store: Path
+    function: str = IDENTIFY
+
+    @property
+    def worker(self) -> WorkerSpec:
+        """Function and limits of a worker."""
+        return WorkerSpec(self.function, Limits(self.time_limit, self.memory_limit))
+
+
+def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
+    """Identify all logs that the store does not hold yet; may be called again after any end.
+
+    Raises StoreError, InputError where a name stands for no file, SchedulerError; what was learnt
+    until then stays in the store.
+    """
+    with Store(request.store, write=True) as store, closing(_make_pool(request, tell)) as pool:
+        scan = Scan(request.rules, request.method, request.time_limit)
+        return Coordinator(store, pool, request, tell).run(scan, request.sources)
+
+
+def _make_pool(request: FleetRun, tell: Listener) -> Pool:
+    if request.scheduler is not None:
+        from drivetwin.fleet.cluster import DaskPool
+
+        return DaskPool(request.scheduler, request.worker, tell)
+    return LocalPool(request.workers or count_usable_cores(), request.worker)

@@ -1,15 +1,223 @@
 # SPDX-License-Identifier: MIT
-"""Worker pools: the interface used by the coordinator, and the processes of this machine."""
+"""Worker pools: the interface used by the coordinator, and the processes of this machine.
+
+A worker process is guarded: it receives a log and is stopped when it exceeds its limits.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
+import select
+import signal
+import subprocess
+import sys
+import tempfile
 import threading
+from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Protocol
+from time import monotonic
+from typing import IO, Protocol
 
-from drivetwin.fleet.guarded_worker import GuardedWorker
-from drivetwin.fleet.task import Reply, Task, WorkerSpec
+from drivetwin.fleet.task import (
+    Aborted,
+    Completed,
+    Limits,
+    Outcome,
+    Reply,
+    State,
+    Task,
+    WorkerLost,
+    WorkerSpec,
+    make_memory_outcome,
+)
+
+_LOOK = 0.1
+"""Time [s] between two looks at a worker's memory."""
+_START = 120.0
+"""Time [s] that a worker may take to import what it needs; a cold network drive is slow."""
+ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1"
+    for library in ("OPENBLAS", "OMP", "MKL", "VECLIB", "NUMEXPR", "RAYON")
+}
+"""Environment in which libraries with threads of their own have one each, since the logs are what
+runs side by side.
+"""
+_TRIMMING = "MALLOC_TRIM_THRESHOLD_"
+"""A Dask nanny sets it for the Dask worker, so that freed memory goes back to the system at once. A
+worker of ours would get the same pages back with the next array, which costs some per cent."""
+
+_GRACE = 2.0
+"""Time [s] for a worker to end that has closed its output."""
+_PAUSES = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""Time [s] to wait after each worker that was killed before it was ready."""
+_BY_ITSELF = "ended with code"
+
+
+class _GoneError(Exception):
+    """The worker ended without an answer."""
+
+
+class GuardedWorker:
+    """Worker process, started on demand and restarted after its end.
+
+    For use by one thread; only `kill` may be called by others.
+    """
+
+    def __init__(self, spec: WorkerSpec) -> None:
+        self._spec = spec
+        self._process: subprocess.Popen[bytes] | None = None
+        self._stderr: IO[bytes] | None = None
+        self._pending = b""
+        self._closed = threading.Event()
+
+    def run(self, task: Task) -> Reply:
+        """Run a task within the limits. Errors of log or worker are returned, not raised."""
+        limits = self._spec.limits
+        if fault := self._start():
+            return fault
+        try:
+            self._send(task)
+            reply = self._read_line(monotonic() + limits.seconds, limits.memory)
+        except _GoneError:
+            return WorkerLost(self._stop_process(_GRACE))
+        if isinstance(reply, Outcome):
+            self._stop_process()
+            return Completed(reply, limits.seconds)
+        tree = json.loads(reply)
+        if "stop" in tree:
+            return Aborted(tree["stop"], tree["remedy"])
+        return Completed(Outcome.from_tree(tree["outcome"]), tree["seconds"])
+
+    def kill(self) -> None:
+        """End a log in progress, from any thread; no worker is made again."""
+        self._closed.set()  # before the look at the process, see `_start`
+        process = self._process
+        if process is not None:
+            process.kill()
+
+    def close(self) -> None:
+        """End the worker, if there is one, from the thread that uses the cell."""
+        self._closed.set()
+        if self._process is not None:
+            self._stop_process()
+
+    def _start(self) -> WorkerLost | Aborted | None:
+        """Start a worker and wait until it is ready; a failed start is not counted against the log.
+
+        One that ends by itself will do so again; one that was killed may have been unlucky.
+        """
+        why = ""
+        for pause in _PAUSES:
+            if self._closed.is_set():
+                return WorkerLost("the run was ended", blame=False)
+            if self._process is not None:
+                return None
+            try:
+                self._spawn()
+                if self._closed.is_set():  # `kill` came before there was a process to end
+                    self._stop_process()
+                    continue
+                if not isinstance(self._read_line(monotonic() + _START, sys.maxsize), Outcome):
+                    return None
+                why = self._stop_process()
+            except _GoneError:
+                why = self._stop_process(_GRACE)
+            except OSError as fault:
+                why = str(fault.strerror)
+            if why.startswith(_BY_ITSELF):
+                break
+            self._closed.wait(pause)
+        return Aborted(
+            f"no worker starts: it {why}", "see whether 'drivetwin identify' runs on this machine"
+        )
+
+    def _spawn(self) -> None:
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the worker
+        self._pending = b""
+        inherited = {name: value for name, value in os.environ.items() if name != _TRIMMING}
+        arguments = (self._spec.function, str(self._spec.limits.memory))
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "drivetwin.fleet.worker", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._stderr,
+            env={**inherited, **ONE_THREAD},
+            start_new_session=True,  # an interrupt at the keyboard is the coordinator's alone
+        )
+
+    def _send(self, task: Task) -> None:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # detected by the end of the answer
+            self._process.stdin.write(task.to_json().encode() + b"\n")
+            self._process.stdin.flush()
+
+    def _read_line(self, deadline: float, memory: int) -> bytes | Outcome:
+        """The worker's next line, or what it went beyond. Raises _GoneError at its end."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        handle = self._process.stdout.fileno()
+        while b"\n" not in self._pending:
+            ready, _, _ = select.select([handle], [], [], _LOOK)
+            if ready:
+                data = os.read(handle, 1 << 16)
+                if not data:
+                    raise _GoneError
+                self._pending += data
+            elif monotonic() > deadline:
+                return make_timeout_outcome(self._spec.limits)
+            elif _read_resident_memory(self._process.pid) > memory:
+                return make_memory_outcome(memory)
+        line, _, self._pending = self._pending.partition(b"\n")
+        return line
+
+    def _stop_process(self, grace: float = 0.0) -> str:
+        """End the worker for good, after `grace` [s] to end by itself; how it ended."""
+        process, self._process = self._process, None
+        assert process is not None
+        try:
+            code = process.wait(grace)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            code = process.wait()
+        for pipe in (process.stdin, process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+        last = self._read_last_stderr()
+        if code < 0:
+            return f"was killed by {signal.Signals(-code).name}{last}"
+        return f"{_BY_ITSELF} {code}{last}"
+
+    def _read_last_stderr(self) -> str:
+        assert self._stderr is not None
+        with self._stderr as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - 2000))
+            lines = file.read().decode("utf-8", "replace").strip().splitlines()
+        return f": {lines[-1][:300]}" if lines else ""
+
+
+def make_timeout_outcome(limits: Limits) -> Outcome:
+    """Return the outcome of a log that exceeded the time limit."""
+    return Outcome(
+        State.QUARANTINED,
+        error="TimeLimit",
+        what=f"it was not done after {limits.seconds:g} s",
+        remedy="look at the log with 'drivetwin inspect'; "
+        "run again with --retry and a larger --time-limit if it is only long",
+    )
+
+
+def _read_resident_memory(pid: int) -> int:
+    """Read the resident memory [bytes] of a process; 0 if the system does not report it."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except (OSError, IndexError, ValueError):
+        return 0
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
 
 AHEAD = 2
 """Tasks given out for each worker: one at work, one at hand. More would only fill memory."""

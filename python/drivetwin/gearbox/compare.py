@@ -8,12 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.errors import SimulationError
-from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.gears import solve_gear
-from drivetwin.gearbox.maneuver import Maneuver, build_signals, build_time_grid, plan
+from drivetwin.gearbox.maneuver import (
+    CouplingError,
+    Maneuver,
+    Traces,
+    build_signals,
+    build_time_grid,
+    plan,
+)
 from drivetwin.gearbox.network import build_network_elements
 from drivetwin.gearbox.reduction import Reduction
-from drivetwin.gearbox.traces import CouplingError, Traces
+from drivetwin.gearbox.spec import Drive
 from drivetwin.simulation.driveline import (
     SHAFT,
     WHEEL,

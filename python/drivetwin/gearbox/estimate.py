@@ -12,10 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.gearbox.drive import Drive
-from drivetwin.gearbox.maneuver import RAMP, Maneuver, build_time_grid, plan
+from drivetwin.gearbox.maneuver import RAMP, CouplingError, Maneuver, Traces, build_time_grid, plan
 from drivetwin.gearbox.reduction import Reduction
-from drivetwin.gearbox.traces import CouplingError, Traces
+from drivetwin.gearbox.spec import Drive
 from drivetwin.simulation.dual_clutch import FloatArray, compute_series_inertia
 
 _GROWTH_STEPS = 4

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A reference shift: the torques and speeds of a clean up-shift under power or coasting down-shift.
+"""A reference shift, and the signals and errors by which two models of it are compared.
 
-The off-going element gives its torque up to the on-coming one, then the on-coming torque, constant
-but for the slope of μ, brings the input to the new gear within the inertia phase, and holds.
+The shift is a clean up-shift under power or a coasting down-shift. The off-going element gives its
+torque up to the on-coming one, then the on-coming torque, constant but for the slope of μ, brings
+the input to the new gear within the inertia phase, and holds.
 """
 
 from __future__ import annotations
@@ -13,11 +14,40 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin.errors import ReductionError
-from drivetwin.gearbox.drive import Drive
 from drivetwin.gearbox.gears import solve_gear
 from drivetwin.gearbox.reduction import Reduction
-from drivetwin.gearbox.spec import Capacity
+from drivetwin.gearbox.spec import Capacity, Drive
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
+
+
+@dataclass(frozen=True)
+class CouplingError:
+    """Largest differences between full gearbox and dual-clutch form over a shift.
+
+    `shaft_torque` [N m], `input_speed` and `output_speed` [rad/s].
+    """
+
+    shaft_torque: float
+    input_speed: float
+    output_speed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """Shaft torque [N m], speeds of input and output [rad/s] of one model; arrays (n,)."""
+
+    shaft_torque: FloatArray
+    input_speed: FloatArray
+    output_speed: FloatArray
+
+    def compute_largest_difference(self, other: Traces) -> CouplingError:
+        """Compare with another model over the same times."""
+        return CouplingError(
+            shaft_torque=float(np.max(np.abs(self.shaft_torque - other.shaft_torque))),
+            input_speed=float(np.max(np.abs(self.input_speed - other.input_speed))),
+            output_speed=float(np.max(np.abs(self.output_speed - other.output_speed))),
+        )
+
 
 LEAD_IN = 0.1
 """Time in the old gear before the torque phase, s."""

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.names import is_time_name
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import FileFormatError, Where

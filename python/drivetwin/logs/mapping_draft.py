@@ -5,19 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping_text import Candidate, Draft, Stub, UnitGap
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.recognition import find_hints
-from drivetwin.channels.roles import NEEDED, ROLES, get_quantity
-from drivetwin.channels.shiftlog import Quantity
-from drivetwin.channels.unit_proposals import (
+from drivetwin.channels.roles import NEEDED, ROLES, Quantity, get_quantity, make_pressure_role
+from drivetwin.channels.units import (
+    find_unit,
     propose_missing_units,
     propose_time_units,
     propose_units,
+    resolve_channel_unit,
 )
-from drivetwin.channels.units import find_unit, resolve_channel_unit
 from drivetwin.errors import UnitError, Where
 from drivetwin.logs.survey import Column, Survey
 

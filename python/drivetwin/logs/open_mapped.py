@@ -8,10 +8,9 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.mapping import Mapped, recall_options
 from drivetwin.channels.mapping_file import describe_way_on
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.recall import recall_options
 from drivetwin.errors import DrivetwinError, MappingError
 from drivetwin.findings import Code, report
 from drivetwin.logs.formats.detect import open_recording

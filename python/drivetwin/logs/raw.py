@@ -20,12 +20,15 @@ from typing import Protocol
 
 import numpy as np
 
-from drivetwin._util.time_steps import compute_median_step
+from drivetwin._util.arrays import compute_median_step
 from drivetwin.channels.filling import Filling, find_filling
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit
 from drivetwin.channels.update_raster import UpdateRaster, find_raster
 from drivetwin.errors import DamagedChannelError, Where
+
+HEAD_BYTES = 8192
+"""Number of bytes of a file by which its format is recognised."""
 
 MIN_SAMPLES = 10
 """Fewer samples of a channel cannot show a shift."""
@@ -125,22 +128,6 @@ class Recording(Protocol):
 
 Opener = Callable[[Path, ReadOptions], AbstractContextManager[Recording]]
 """Function that opens a file of one format."""
-
-
-@dataclass(frozen=True)
-class LogFormat:
-    """Registered format of logs.
-
-    A file has it if it starts with one of `starts`, or if `recognises` is True for its first
-    bytes. A folder is searched for files with its `endings`. With `guarded` the file is read in a
-    child process, because the library trusts damaged bytes.
-    """
-
-    opener: Opener
-    endings: tuple[str, ...]
-    starts: tuple[bytes, ...] = ()
-    recognises: Callable[[bytes], bool] = lambda _: False
-    guarded: bool = False
 
 
 @dataclass(frozen=True)

@@ -11,19 +11,34 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.progress import notify_progress
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin._util.timed_stages import TimedStages
-from drivetwin.channels.channel_spec import ChannelSpec, RememberedChannel, RememberedMapping
+from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.channels.pressure_roles import get_command_element
-from drivetwin.channels.read_options import ReadOptions
-from drivetwin.channels.roles import AUXILIARY, FOR_SHIFTS, STAND_INS, get_quantity, is_extra
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity, ShiftLog
-from drivetwin.channels.unit_proposals import Proposal, propose_missing_units
-from drivetwin.channels.units import Unit, find_unit, list_first_spellings, resolve_channel_unit
+from drivetwin.channels.read_options import (
+    ChannelSpec,
+    ReadOptions,
+    RememberedChannel,
+    RememberedMapping,
+)
+from drivetwin.channels.roles import (
+    AUXILIARY,
+    FOR_SHIFTS,
+    STAND_INS,
+    Quantity,
+    get_command_element,
+    get_quantity,
+    is_extra,
+)
+from drivetwin.channels.shiftlog import Channel, FloatArray, ShiftLog
+from drivetwin.channels.units import (
+    Proposal,
+    Unit,
+    find_unit,
+    list_first_spellings,
+    propose_missing_units,
+    resolve_channel_unit,
+)
 from drivetwin.errors import (
     DamagedChannelError,
     DrivetwinError,
@@ -33,6 +48,7 @@ from drivetwin.errors import (
     TimeError,
     UnitError,
     Where,
+    suggest_spelling,
 )
 from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.formats.detect import open_recording
@@ -45,10 +61,10 @@ from drivetwin.logs.quality.consistency_checks import (
     check_gearing,
     check_torque_balance,
     check_torque_signs,
+    mark_late_samples,
+    replace_filling,
 )
-from drivetwin.logs.quality.time_alignment import check_speed_clocks
-from drivetwin.logs.quality.torque_delay import check_torque_delays
-from drivetwin.logs.quality.update_raster import mark_late_samples, replace_filling
+from drivetwin.logs.quality.time_alignment import check_speed_clocks, check_torque_delays
 from drivetwin.logs.raw import RawChannel, RawLog, Recording, Window
 from drivetwin.vehicle.card import VehicleCard
 

@@ -10,15 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin._util.time_steps import remember_for_arrays
-from drivetwin.channels.channel_spec import ChannelSpec
+from drivetwin._util.arrays import remember_for_arrays
 from drivetwin.channels.filling import Filling, FillKind
 from drivetwin.channels.mapping import Mapped, combine_specs, make_spec, select_free
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.read_options import ChannelSpec, ReadOptions
 from drivetwin.channels.read_options import Column as LogColumn
-from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.recognition import infer_candidates
-from drivetwin.channels.roles import NEEDED
+from drivetwin.channels.roles import NEEDED, make_pressure_role
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.raw import RawChannel, Recording

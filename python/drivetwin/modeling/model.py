@@ -18,7 +18,7 @@ from html import escape
 
 import numpy as np
 
-from drivetwin._util.spelling import suggest_spelling
+from drivetwin.errors import suggest_spelling
 from drivetwin.export.modelica.model import Run, format_package
 from drivetwin.fit.fit import fit_network
 from drivetwin.fit.network_model import NetworkModel
@@ -31,8 +31,7 @@ from drivetwin.modeling.part import Node, Part
 from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
-from drivetwin.simulation.input_value import make_input
-from drivetwin.simulation.network import Output, Sine, Start, simulate
+from drivetwin.simulation.network import Output, Sine, Start, make_input, simulate
 from drivetwin.simulation.network_sensitivity import NetworkSensitivities, Unknowns, differentiate
 from drivetwin.simulation.serialize import as_array, require_number
 

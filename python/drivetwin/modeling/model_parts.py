@@ -17,8 +17,7 @@ from drivetwin.simulation.element_schema import (
     list_ports,
     refuse_faults,
 )
-from drivetwin.simulation.input_value import InputValue
-from drivetwin.simulation.network import Element, build_element
+from drivetwin.simulation.network import Element, InputValue, build_element
 
 Place = Node | Port | Part | str
 

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.modeling.part import Part
 from drivetwin.report.data_frames import import_pandas
 from drivetwin.simulation.dual_clutch import EnergyAudit, Event, FloatArray

@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from math import pi
+from drivetwin.channels.units import BAR, DEG, RPM
 
-RPM = pi / 30.0
-DEG = pi / 180.0
-BAR = 1e5
+__all__ = ["BAR", "DEG", "KILOMETRE_PER_HOUR", "KILOWATT", "MILLISECOND", "RPM"]
+
 KILOMETRE_PER_HOUR = 1.0 / 3.6
 KILOWATT = 1e3
 MILLISECOND = 1e-3

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.estimation.data.noise import prepare_signal

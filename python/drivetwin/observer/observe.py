@@ -29,8 +29,7 @@ from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
-from drivetwin.simulation.part_parameters import describe_parts
-from drivetwin.simulation.vehicle_parts import VehicleParts
+from drivetwin.simulation.vehicle_parts import VehicleParts, describe_parts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
 from drivetwin.vehicle.spec import PriorValue

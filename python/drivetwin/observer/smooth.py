@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.observer.inputs import (
     Recorded,

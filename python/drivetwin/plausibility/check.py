@@ -8,16 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import BAR
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.plausibility.entries import check_entries, find_entry
-from drivetwin.plausibility.friction import check_friction
-from drivetwin.plausibility.inertias import check_inertias
+from drivetwin.plausibility.friction import check_friction, check_inertias, sample_span
 from drivetwin.plausibility.ratios import check_ratios, find_log_ratios, is_held
-from drivetwin.plausibility.spans import sample_span
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

@@ -11,10 +11,9 @@ import numpy as np
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError
 from drivetwin.findings import Code, Finding, Number, report
-from drivetwin.plausibility.entries import find_entry
-from drivetwin.plausibility.settings import PLAUSIBILITY
+from drivetwin.plausibility.entries import PLAUSIBILITY, find_entry
 from drivetwin.shifts.kinematics import GearboxSpeeds, resample_speeds
-from drivetwin.shifts.settings import ShiftSettings
+from drivetwin.shifts.shift import ShiftSettings
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

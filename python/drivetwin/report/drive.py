@@ -9,7 +9,7 @@ from io import StringIO
 import numpy as np
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.drive.result import TRACE_STEP, DriveRun, Maneuver
 from drivetwin.report.blocks import FigureBlock, Section, TableBlock, make_table
 from drivetwin.report.figure import Figure, make_trace

@@ -12,7 +12,7 @@ from drivetwin._util.display_units import (
     format_uncertainty,
     get_display_unit,
 )
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.fit import HeldOut

@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 from drivetwin._util.display_units import Display, get_display_unit
-from drivetwin.channels.pressure_roles import get_command_element, get_pressure_element
-from drivetwin.channels.roles import get_quantity
+from drivetwin.channels.roles import get_command_element, get_pressure_element, get_quantity
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 

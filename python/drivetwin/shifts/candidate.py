@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From two gears held to the shift between them, or the reason why there is none.
+"""From gears held, as runs of their speed ratio, to the shift between two of them.
 
-Detection of engaged gears: runs of samples with the speed ratio of a gear.
+Without a shift there is a reason.
 """
 
 from __future__ import annotations
@@ -14,21 +14,22 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.channels.units import BAR
 from drivetwin.findings import Code, Finding, Number, report
-from drivetwin.shifts.breakaway_lockup import Boundary, locate_break_away, locate_lock_up
-from drivetwin.shifts.kinematics import GearboxSpeeds, is_shared_pressure
-from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import Shift, classify_shift
-from drivetwin.shifts.tcu_flags import find_flag_start
-from drivetwin.shifts.torque_onset import (
+from drivetwin.shifts.breakaway_lockup import (
     SMOOTH,
+    Boundary,
+    locate_break_away,
+    locate_lock_up,
     locate_pressure_onset,
     locate_torque_dip,
     smooth_channel,
 )
+from drivetwin.shifts.kinematics import GearboxSpeeds, is_shared_pressure
+from drivetwin.shifts.shift import Shift, ShiftSettings, classify_shift
+from drivetwin.shifts.tcu_flags import find_flag_start
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard

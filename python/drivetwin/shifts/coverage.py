@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import Span
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.findings import Code, report

@@ -23,8 +23,7 @@ from drivetwin.shifts.candidate import (
 )
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.quality import compute_shift_quality
-from drivetwin.shifts.settings import ShiftSettings
-from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.shifts.shift import RejectedShift, Shift, ShiftSettings
 from drivetwin.shifts.tcu_flags import check_flags
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

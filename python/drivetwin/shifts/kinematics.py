@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Gearbox speeds on one time base, and the synchronisation error of a gear.
-
-Pressures of the two elements of a shift, also where one clutch serves both gears.
+"""Gearbox speeds and pressures of a shift: synchronisation error, one clutch for both gears.
 
 In a manual gearbox the clutch opens, the other gear is engaged, and it closes again: one pressure,
 mapped to two elements of the card. It belongs to the off-going element until the clutch is open,
@@ -16,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.findings import Code, Finding, report

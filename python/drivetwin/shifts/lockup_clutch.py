@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.signal_processing import compute_moving_mean, find_true_runs
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.shift import Shift

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shift quality figures of one shift; what cannot be computed is absent, never guessed.
-
-Metrics of shift quality, each as one function of signals.
-"""
+"""Metrics of the quality of one shift, each a function of signals; absent where not computable."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import filter_zero_phase
-from drivetwin.channels.pressure_roles import make_command_role
+from drivetwin.channels.roles import make_command_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.shift import Shift

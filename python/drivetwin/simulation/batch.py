@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from drivetwin._native import batch_sensitivities as native_batch_sensitivities
 from drivetwin._native import simulate_batch as native_simulate_batch
 from drivetwin.errors import InputError
-from drivetwin.simulation.driveline_start import build_start
+from drivetwin.simulation.driveline import build_start
 from drivetwin.simulation.dual_clutch import (
     MOTION,
     CoreSamples,
@@ -31,8 +31,8 @@ from drivetwin.simulation.dual_clutch import (
     run_time,
     to_delayed_core_samples,
 )
-from drivetwin.simulation.dual_clutch_paths import Seed, list_seeds, place_sets
-from drivetwin.simulation.network_output import NativeOutput
+from drivetwin.simulation.dual_clutch_sensitivity import Seed, list_seeds, place_sets
+from drivetwin.simulation.network import NativeOutput
 from drivetwin.simulation.serialize import as_array, as_json, as_names
 from drivetwin.simulation.vehicle_parts import NO_PARTS
 

@@ -16,8 +16,8 @@ from drivetwin.simulation.driveline import (
     WALK,
     WHEEL,
     build_driveline,
+    build_start,
 )
-from drivetwin.simulation.driveline_start import build_start
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     Accuracy,

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drivetwin._native import element_schema
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.simulation.serialize import format_value, is_number
 
 GROUND = "ground"

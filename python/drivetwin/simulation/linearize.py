@@ -19,8 +19,7 @@ from drivetwin._native import linearise as native_linearise
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
-from drivetwin.simulation.network import Element
-from drivetwin.simulation.network_output import Request, combine_columns, resolve_output
+from drivetwin.simulation.network import Element, Request, combine_columns, resolve_output
 from drivetwin.simulation.serialize import as_json, as_names, require_number
 
 Output = tuple[str, str]

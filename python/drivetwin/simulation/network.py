@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Any driveline as a network of elements: described as data, simulated by the core.
+"""Any driveline as a network of elements: described as data, simulated and recorded by the core.
 
 An element is a mapping with `type`, `name` and the fields of its kind, SI throughout; the kinds
 and their laws are listed in docs/reference/elements.md. Nodes are the names used at the flanges;
-`ground` does not turn.
+`ground` does not turn. Recorded quantities are named by a kind and a node or element.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
 from drivetwin._native import simulate_network as native_simulate_network
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     CoreStart,
@@ -25,9 +26,91 @@ from drivetwin.simulation.dual_clutch import (
     run_time,
     to_core_samples,
 )
-from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
-from drivetwin.simulation.network_output import Request, combine_columns, resolve_output
-from drivetwin.simulation.serialize import as_json, as_names, require_number
+from drivetwin.simulation.element_schema import (
+    GROUND,
+    find_element_faults,
+    list_inputs,
+    list_ports,
+    refuse_faults,
+)
+from drivetwin.simulation.serialize import as_json, as_names, format_value, require_number
+
+_OF_NODES = ("speed", "acceleration", "angle")
+_OF_ELEMENTS = (
+    *("twist", "shaft_torque", "slip", "friction_torque"),
+    *("torque", "power", "loss", "work", "heat", "energy"),
+)
+_UNBALANCED = ("gear", "torque_converter")
+"""Elements with a housing: their torques at the ports do not vanish in sum."""
+
+
+NativeOutput = tuple[str, tuple[str, ...]]
+"""Quantity as the core names it: its kind, and the name of its node or element, or element and node
+of a torque."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """Quantities that the core records for one output: `sign` times their sum."""
+
+    native: tuple[NativeOutput, ...]
+    sign: float = 1.0
+
+
+def resolve_output(output: tuple[str, str], elements: Sequence[Mapping[str, Any]]) -> Request | str:
+    """Return the request of an output, or its fault.
+
+    A port at the ground takes what the other ports leave: the torques of an element without
+    housing vanish in sum.
+    """
+    known = (*_OF_NODES, *_OF_ELEMENTS)
+    if not (isinstance(output, tuple | list) and len(output) == 2 and isinstance(output[1], str)):
+        return f"output {output!r}: write (kind, name)"
+    kind, name = output
+    if kind not in known:
+        return f"output {output!r}: unknown kind{suggest_spelling(str(kind), known)}"
+    if kind != "torque":
+        return Request(((kind, (name,)),))
+    element_name, _, port = name.rpartition(".")
+    by_name = {str(element["name"]): element for element in elements}
+    if element_name not in by_name:
+        hint = suggest_spelling(element_name, by_name)
+        return f"output {output!r}: write 'element.port'; no element {element_name!r}{hint}"
+    element = by_name[element_name]
+    ports = list_ports(element)
+    if port not in ports:
+        return f"output {output!r}: no port {port!r}{suggest_spelling(port, ports)}"
+    if ports[port] != GROUND:
+        return Request((("torque", (element_name, ports[port])),))
+    if element["type"] in _UNBALANCED:
+        return f"output {output!r}: the housing holds this port, its torque is not computed"
+    others = [node for node in ports.values() if node != GROUND]
+    return Request(tuple(("torque", (element_name, node)) for node in others), -1.0)
+
+
+def to_native(
+    elements: Sequence[Mapping[str, Any]], outputs: Sequence[tuple[str, str]]
+) -> list[NativeOutput]:
+    """Return outputs without a fault, none of them at the ground, as the core takes them."""
+    requests = [resolve_output(one, elements) for one in outputs]
+    return [one.native[0] for one in requests if isinstance(one, Request)]
+
+
+def combine_columns(
+    requests: Sequence[Request], columns: FloatArray | list[FloatArray]
+) -> list[FloatArray]:
+    """Columns of the outputs from those of the core, in the order of the requests."""
+    combined = []
+    start = 0
+    for request in requests:
+        end = start + len(request.native)
+        if request.sign == 1.0 and end == start + 1:
+            combined.append(columns[start])
+        else:
+            combined.append(np.asarray(request.sign * np.sum(columns[start:end], axis=0)))
+        start = end
+    return combined
+
 
 Element = Mapping[str, Any]
 OutputKind = Literal[
@@ -66,6 +149,35 @@ class Sine:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             require_number(f"{name} of a sine", value)
+
+
+InputValue = float | Sequence[tuple[float, float]] | FloatArray | Signal | Sine
+"""A constant; points (n, 2) of time [s] and value, linear between and constant beyond; samples."""
+
+
+def make_input(name: str, value: InputValue, span: tuple[float, float]) -> Signal | Sine:
+    """Return the input of a run over `span` [s]. Raises InputError for what is none."""
+    if isinstance(value, Signal | Sine):
+        return value
+    try:
+        points = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        points = np.zeros((0, 0))
+    if points.ndim == 0:
+        points = np.array([[span[0], float(points)]])
+    if points.ndim != 2 or points.shape[1] != 2 or not len(points):
+        raise InputError(
+            f"the input of {name} is {format_value(value)}",
+            "give a number, points [(time, value), ...], a Signal or a Sine",
+        )
+    first, last = points[0], points[-1]
+    rows = [
+        *([(span[0], first[1])] if first[0] > span[0] else []),
+        *map(tuple, points),
+        *([(span[1], last[1])] if last[0] < span[1] else []),
+    ]
+    time, values = np.array(rows).T
+    return Signal(time, values)
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,13 @@ from drivetwin.simulation.batch import (
 from drivetwin.simulation.dual_clutch import FloatArray, Signal, to_delayed_core_samples
 from drivetwin.simulation.network import (
     Element,
+    NativeOutput,
     Output,
     Sine,
     Start,
     resolve_outputs,
     to_core_sines,
 )
-from drivetwin.simulation.network_output import NativeOutput
 from drivetwin.simulation.network_sensitivity import (
     Unknowns,
     collect_weights,

@@ -16,8 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from drivetwin._native import network_sensitivities
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     Event,
@@ -30,12 +29,13 @@ from drivetwin.simulation.network import (
     Element,
     NetworkRun,
     Output,
+    Request,
     Sine,
     Start,
+    combine_columns,
     resolve_outputs,
     to_core_sines,
 )
-from drivetwin.simulation.network_output import Request, combine_columns
 from drivetwin.simulation.serialize import as_json, as_names, is_number
 from drivetwin.simulation.variable import Variable, iterate_variables, seed, seed_description
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Parts that a vehicle may have beside the dual clutch, by their physical values."""
+"""Parts that a vehicle may have beside the dual clutch, by their physical values and parameters.
+
+Among them the map of a torque converter.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,55 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivetwin.simulation.converter_map import Converter
-from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal
+
+
+@dataclass(frozen=True)
+class Converter:
+    """Steady-state map over ν = ω_turbine/ω_pump: `capacity` [N m s^2/rad^2] and torque ratio."""
+
+    speed_ratio: tuple[float, ...]
+    capacity: tuple[float, ...]
+    torque_ratio: tuple[float, ...]
+
+    def compute_pump_torque(
+        self, pump: FloatArray | float, turbine: FloatArray | float
+    ) -> FloatArray:
+        """Torque that the pump takes [N m] at speeds of pump and turbine [rad/s], pump > 0."""
+        capacity = np.interp(np.divide(turbine, pump), self.speed_ratio, self.capacity)
+        return np.asarray(capacity * np.square(pump), dtype=np.float64)
+
+    def compute_torque_ratio(
+        self, pump: FloatArray | float, turbine: FloatArray | float
+    ) -> FloatArray:
+        """Turbine torque over pump torque."""
+        ratio = np.interp(np.divide(turbine, pump), self.speed_ratio, self.torque_ratio)
+        return np.asarray(ratio, dtype=np.float64)
+
+    def compute_turbine_torque(
+        self, pump: FloatArray | float, turbine: FloatArray | float
+    ) -> FloatArray:
+        """Torque that the turbine gives [N m] at speeds of pump and turbine [rad/s], pump > 0."""
+        return self.compute_torque_ratio(pump, turbine) * self.compute_pump_torque(pump, turbine)
+
+    def compute_turbine_slopes(
+        self, pump: FloatArray, turbine: FloatArray, steps: tuple[float, float]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the turbine's torque (n,) [N m s/rad] by the speeds of pump and turbine.
+
+        As secants over ± `steps` [rad/s] of either speed, so that at a corner of the map the mean
+        of both sides counts.
+        """
+        of_pump = np.minimum(steps[0], 0.5 * pump)
+        of_turbine = np.full_like(turbine, steps[1])
+        by_pump = self.compute_turbine_torque(
+            pump + of_pump, turbine
+        ) - self.compute_turbine_torque(pump - of_pump, turbine)
+        by_turbine = self.compute_turbine_torque(
+            pump, turbine + of_turbine
+        ) - self.compute_turbine_torque(pump, turbine - of_turbine)
+        return by_pump / (2.0 * of_pump), by_turbine / (2.0 * of_turbine)
+
 
 RIM_SHARE = 0.02
 """Share of the vehicle's inertia before the tyre: rims, tyres and side shafts; an engineering
@@ -117,3 +167,63 @@ class VehicleParts:
 
 
 NO_PARTS = VehicleParts()
+
+
+MODE_FREQUENCY, MODE_SHARE, MODE_DAMPING = "mode_frequency", "mode_share", "mode_damping"
+BACKLASH, TYRE_SLIP = "backlash", "tyre_slip"
+PROGRESSION, REFERENCE = "shaft_progression", "shaft_reference"
+"""Parameter ids, see `drivetwin.parameters`."""
+PARTS: Mapping[str, tuple[str, ...]] = {
+    "an input shaft": (MODE_FREQUENCY, MODE_SHARE, MODE_DAMPING),
+    "backlash in the output shaft": (BACKLASH,),
+    "slip of the tyres": (TYRE_SLIP, REFERENCE),
+    "a progressive output shaft": (PROGRESSION, REFERENCE),
+}
+"""Parameters of each part by its name, that of the size first."""
+PART_IDS = tuple(dict.fromkeys(name for ids in PARTS.values() for name in ids))
+"""All ids of parts, in reporting order."""
+
+
+def select_parts(values: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters by id of the parts all of whose parameters are in `values`."""
+    complete = [ids for ids in PARTS.values() if all(name in values for name in ids)]
+    return {name: values[name] for name in PART_IDS if any(name in ids for ids in complete)}
+
+
+def build_parts(values: Mapping[str, float], model: DualClutch) -> VehicleParts:
+    """Build the parts that parameters describe.
+
+    Parameters
+    ----------
+    values
+        Parameters by id; ids of no part, and of parts that are incomplete, are ignored.
+    model
+        Dual clutch of a shift.
+
+    Returns
+    -------
+    VehicleParts
+        `NO_PARTS` where the parameters describe none.
+    """
+    values = select_parts(values)
+    if not values:
+        return NO_PARTS
+    front = tyre = table = None
+    if MODE_FREQUENCY in values:
+        inertia = values[MODE_SHARE] * model.J1
+        front = InputShaft.from_mode(inertia, values[MODE_FREQUENCY], values[MODE_DAMPING])
+    if TYRE_SLIP in values:
+        tyre = TyreSlip.from_slip(values[REFERENCE] * model.i_f, values[TYRE_SLIP], model.J_v)
+    if PROGRESSION in values:
+        table = ShaftTable.from_factor(model.k_o, values[REFERENCE], values[PROGRESSION])
+    return VehicleParts(
+        front=front,
+        gap=values.get(BACKLASH, 0.0),
+        shaft_table=table,
+        tyre=tyre,
+    )
+
+
+def describe_parts(values: Mapping[str, float]) -> str:
+    """Describe the parts that parameters by id describe, in words."""
+    return " and ".join(name for name, (size, *_) in PARTS.items() if size in values)

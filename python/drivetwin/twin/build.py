@@ -12,14 +12,14 @@ from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.channels.channel_spec import RememberedChannel, RememberedMapping
+from drivetwin.channels.read_options import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FrictionCurve, LoadLaw
 from drivetwin.estimation.result.estimate_set import JointCovariance
 from drivetwin.estimation.result.verdict import from_prior
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
-from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
+from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -17,7 +17,7 @@ from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.parameters import LAW_KEYS, OVER_ETA, SPECS, make_law_id
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, ShiftElement, Stribeck
-from drivetwin.simulation.part_parameters import PART_IDS, PROGRESSION
+from drivetwin.simulation.vehicle_parts import PART_IDS, PROGRESSION
 from drivetwin.twin.friction_law import (
     build_partner_spread,
     compute_law_covariance,
@@ -26,7 +26,7 @@ from drivetwin.twin.friction_law import (
     to_values,
 )
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD
+from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
 
 _NEGLIGIBLE = 1e-9
 """Variance of a direction over the largest below which it is rounding [ratio]."""

@@ -9,7 +9,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
-from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD, PARTNER_REST_STD
+from drivetwin.vehicle.spec import PARTNER_LEVEL_STD, PARTNER_REST_STD
 
 
 def to_values(law: Stribeck) -> FloatArray:

@@ -13,13 +13,12 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.channels.channel_spec import RememberedMapping
+from drivetwin.channels.read_options import RememberedMapping
 from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, make_ratio_id
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FrictionTable,
@@ -28,8 +27,13 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Stribeck,
 )
-from drivetwin.simulation.part_parameters import PART_IDS, build_parts, select_parts
-from drivetwin.simulation.vehicle_parts import VehicleParts
+from drivetwin.simulation.vehicle_parts import (
+    PART_IDS,
+    Converter,
+    VehicleParts,
+    build_parts,
+    select_parts,
+)
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue, move_clutch_ratios
 from drivetwin.vehicle.vehicle_card import VehicleCard

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin.channels.command_pressure import compute_pressure_channel
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
+from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import MissingChannelError, MissingParameterError, Where
+from drivetwin.estimation.data.actuators import compute_pressure_channel
 from drivetwin.twin.twin import Twin
 
 

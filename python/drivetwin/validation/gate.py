@@ -21,10 +21,9 @@ from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA, ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.cause import EXPLAINED, PredictedSpread
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.estimation.result.friction_verdict import USUAL_FRICTION
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.validation import SignalTrace, Validation
-from drivetwin.estimation.result.verdict import apply_errors
+from drivetwin.estimation.result.verdict import USUAL_FRICTION, apply_errors
 from drivetwin.findings import (
     Code,
     Finding,

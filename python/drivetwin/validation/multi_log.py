@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError, IdentificationError, InputError, Where
 from drivetwin.estimation.data.prepare import prepare_shift

@@ -11,8 +11,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import notify_progress
-from drivetwin.channels.pressure_roles import make_pressure_role
-from drivetwin.channels.roles import get_quantity
+from drivetwin.channels.roles import get_quantity, make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification

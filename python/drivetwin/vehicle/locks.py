@@ -13,8 +13,7 @@ from enum import StrEnum
 from numbers import Real
 
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.spelling import suggest_spelling
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.parameters import SPECS, get_parameter_spec
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard

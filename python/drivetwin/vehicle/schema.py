@@ -24,15 +24,19 @@ from drivetwin.channels.units import BAR, convert_table
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.card_fields import read_card_fields
 from drivetwin.vehicle.converter import ConverterTable
-from drivetwin.vehicle.distribution import (
+from drivetwin.vehicle.effects import EffectPrior
+from drivetwin.vehicle.spec import (
+    ClutchGeometry,
+    ElementSpec,
+    Gear,
+    PriorValue,
+    SensorTolerance,
     describe_assumed_gain,
     describe_fill_pressure,
     describe_inertia,
     describe_ratio,
     parse_teeth,
 )
-from drivetwin.vehicle.effects import EffectPrior
-from drivetwin.vehicle.spec import ClutchGeometry, ElementSpec, Gear, PriorValue, SensorTolerance
 
 
 def _describe(schema: dict[str, Any], *section: str) -> None:

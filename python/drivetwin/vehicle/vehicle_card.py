@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivetwin.channels.channel_spec import ChannelSpec, RememberedMapping
+from drivetwin.channels.read_options import ChannelSpec, RememberedMapping
 from drivetwin.errors import CardError, Where
-from drivetwin.simulation.converter_map import Converter
 from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.simulation.vehicle_parts import Converter
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import (
     ElementSpec,

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.identification import Identification

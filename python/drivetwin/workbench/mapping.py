@@ -6,12 +6,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from drivetwin.channels.channel_spec import ChannelSpec
 from drivetwin.channels.mapping import make_spec
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
+from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.read_options import Column as LogColumn
-from drivetwin.channels.roles import EXTRA_ROLES, ROLES, get_quantity, is_extra
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import (
+    EXTRA_ROLES,
+    ROLES,
+    Quantity,
+    get_quantity,
+    is_extra,
+    make_command_role,
+    make_pressure_role,
+)
 from drivetwin.channels.units import (
     is_time_unit,
     list_first_spellings,

@@ -24,14 +24,14 @@ from drivetwin.authoring.log_survey import (
 from drivetwin.channels.mapping import Mapped, combine_specs
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
-from drivetwin.channels.pressure_roles import get_element
+from drivetwin.channels.roles import get_element
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.channels.unit_proposals import Proposal, propose_time_units
+from drivetwin.channels.units import Proposal, propose_time_units
 from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
-from drivetwin.logs.formats.parser_limits import compute_parser_limits
+from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.logs.open_mapped import open_stated
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, find_shortest_step, survey_recording

@@ -27,7 +27,7 @@ from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
-from drivetwin.logs.formats.parser_limits import BASE_TIME, compute_parser_limits
+from drivetwin.logs.formats.guarded import BASE_TIME, compute_parser_limits
 from drivetwin.report.figure import Figure
 from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace

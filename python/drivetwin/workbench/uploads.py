@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO
 
 from drivetwin.errors import RefusedError, Where
-from drivetwin.logs.formats.parser_limits import compute_parser_limits
+from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.workbench import jobs
 
 LIMITS = {

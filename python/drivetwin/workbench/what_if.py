@@ -25,7 +25,7 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Stribeck,
 )
-from drivetwin.simulation.part_parameters import PART_IDS
+from drivetwin.simulation.vehicle_parts import PART_IDS
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
 from drivetwin.workbench.zoom import View, encode_curves

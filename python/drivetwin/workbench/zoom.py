@@ -12,8 +12,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display
-from drivetwin.report.decimate import decimate_around
-from drivetwin.report.figures.stack import Curve, Panel
+from drivetwin.report.figures.stack import Curve, Panel, decimate_around
 
 
 def parse_number(value: object) -> float | None:

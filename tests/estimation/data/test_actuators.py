@@ -10,8 +10,7 @@ import pytest
 
 from drivetwin.actuator.identify import ActuatorSource
 from drivetwin.actuator.model import QUANTITIES
-from drivetwin.channels.command_pressure import compute_pressure_channel
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
+from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
@@ -19,6 +18,7 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.actuators import (
     FoundActuators,
     LogShifts,
+    compute_pressure_channel,
     identify_actuators,
 )
 from drivetwin.findings import Code

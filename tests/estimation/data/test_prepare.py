@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.data import prepare as preparation
 from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.prepare import (

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.select_shifts import (
     SHIFT_SELECTION,

@@ -17,8 +17,7 @@ from drivetwin.estimation.likelihood.budget import (
 )
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import fit_local, refine
-from drivetwin.estimation.likelihood.optimize.staged_start import find_staged_start
+from drivetwin.estimation.likelihood.optimize.multistart import find_staged_start, fit_local, refine
 from drivetwin.estimation.likelihood.selection import select_model as selection_module
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO

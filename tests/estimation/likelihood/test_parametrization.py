@@ -23,7 +23,7 @@ from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import is_ratio
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
-from tests.estimation.data.test_measured_ratios import rough_driveline
+from tests.estimation.data.test_prepare_measured_ratios import rough_driveline
 from tests.estimation.likelihood.fixtures import bench, truth_of
 from tests.shifts.fixtures import make_card
 

@@ -13,10 +13,9 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Consistency, Identification
 from drivetwin.estimation.likelihood.fit import compute_variance_inflation
 from drivetwin.estimation.multi_log.consistency import LogScore, compute_homogeneity, find_shared
-from drivetwin.estimation.result.multi_log import Consistency
 from drivetwin.findings import Code
 from tests.estimation.multi_log.fixtures import loaded, together
 

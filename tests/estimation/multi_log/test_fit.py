@@ -12,6 +12,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.prepare import prepare
+from drivetwin.estimation.identification import Several
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.parametrization import LOG_SPECIFIC
 from drivetwin.estimation.multi_log.consistency import find_shared
@@ -21,7 +22,6 @@ from drivetwin.estimation.multi_log.fit import (
     find_largest_differences,
     merge_tolerances,
 )
-from drivetwin.estimation.result.multi_log import Several
 from drivetwin.parameters import split_log_number
 from drivetwin.pipeline import identify, identify_jointly
 from tests.estimation.asked import still

@@ -16,7 +16,7 @@ from scipy.io import savemat
 
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import DamagedChannelError, FileFormatError, ReaderFailureError
-from drivetwin.logs.formats import guarded, parser_limits
+from drivetwin.logs.formats import guarded
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.formats.guarded import open_guarded
 from drivetwin.logs.raw import Opener, Recording
@@ -33,7 +33,7 @@ def _guarded(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Recording]:
     """A recording in a child that may take 64 MiB."""
-    monkeypatch.setattr(parser_limits, "BASE_MEMORY", 2**26)
+    monkeypatch.setattr(guarded, "BASE_MEMORY", 2**26)
     with open_guarded(open_hostile, tmp_path / "log.bin", ReadOptions()) as opened:
         yield opened
 
@@ -108,7 +108,7 @@ def test_a_reader_that_ends_is_a_typed_error_with_its_last_word(recording: Recor
 def test_a_reader_that_hangs_is_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opener: Opener
 ) -> None:
-    monkeypatch.setattr(parser_limits, "BASE_TIME", 5.0)
+    monkeypatch.setattr(guarded, "BASE_TIME", 5.0)
     with (
         pytest.raises(ReaderFailureError, match="not read after 5 s"),
         open_guarded(opener, tmp_path / "log.bin", ReadOptions()) as recording,

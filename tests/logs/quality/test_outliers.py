@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin._util.signal_processing import find_true_runs
-from drivetwin.channels.shiftlog import FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import Where
 from drivetwin.findings import Code
 from drivetwin.logs.quality.outliers import (

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.findings import Code
 from drivetwin.logs.quality.time_alignment import (
     check_speed_clocks,

@@ -12,9 +12,8 @@ import pytest
 from drivetwin.estimation.linear.ringdown import RingDown
 from drivetwin.estimation.paper.wlse import GridFit, GridRow
 from drivetwin.report.blocks import FigureBlock
-from drivetwin.report.embedded_data import Store
 from drivetwin.report.figures.stage_results import plot_ringdown, plot_wlse
-from drivetwin.report.html import encode_figure
+from drivetwin.report.html import Store, encode_figure
 from drivetwin.report.sections.stage_results import INERTIA_LABELS, build_grid_table
 
 

@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from drivetwin.simulation.driveline import SHAFT, build_driveline
-from drivetwin.simulation.driveline_start import build_start
+from drivetwin.simulation.driveline import SHAFT, build_driveline, build_start
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,

@@ -2,9 +2,7 @@
 """Actuators from the logs that contain the commanded pressure of an element.
 
 Beside the command stands the measured pressure, or where there is none the torque of the clutch in
-the shifts in which it slips.
-
-Torque balance of a slipping clutch in a shift, for an actuator without measured pressure.
+the shifts in which it slips. An identified actuator turns a command into the pressure.
 
 The torque of the other clutch (index 1) is eliminated from both balances of the dual-clutch
 driveline (THEORY section 3), with i_out and α of both:
@@ -26,17 +24,15 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import integrate_trapezoids
 from drivetwin.actuator.from_torque import TorqueRecord, identify_from_torque
-from drivetwin.actuator.held_signal import HeldSignal
 from drivetwin.actuator.identify import (
     ActuatorSource,
     IdentifiedActuator,
     PressureRecord,
     identify_actuator,
 )
-from drivetwin.actuator.model import QUANTITIES
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
 from drivetwin.actuator.search import Prior
-from drivetwin.channels.command_pressure import get_held_command
-from drivetwin.channels.pressure_roles import make_command_role, make_pressure_role
+from drivetwin.channels.roles import Quantity, make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.noise import prepare_signal
@@ -48,7 +44,31 @@ from drivetwin.vehicle.spec import compute_middle
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _STEP = 1e-3
-"""Step [s] of the raster on which the clutch torque is computed."""
+"""Step [s] of the rasters of calculated pressures and clutch torques, linear between samples."""
+
+
+def get_held_command(command: Channel) -> HeldSignal:
+    """Return the finite values of a commanded pressure, each held until the next."""
+    known = np.isfinite(command.values)
+    return HeldSignal(command.time[known], command.values[known])
+
+
+def compute_pressure_channel(command: Channel, model: ActuatorModel, element: str) -> Channel:
+    """Pressure of a clutch over the time of its command, by the model of its actuator."""
+    held = get_held_command(command)
+    first, last = float(held.time[0]), float(held.time[-1])
+    count = int((last - first) / _STEP + 1e-6) + 1
+    time = first + _STEP * np.arange(count, dtype=np.float64)
+    return Channel(
+        make_pressure_role(element),
+        Quantity.PRESSURE,
+        time,
+        model.compute_pressure(held, time),
+        command.source_name,
+        command.source_unit,
+    )
+
+
 _BLOCK = 5
 """Samples of the raster of which means are compared."""
 _BEFORE = 0.6

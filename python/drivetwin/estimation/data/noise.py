@@ -1,12 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Noise level of a channel, from the log itself.
+"""Samples of one channel for the estimates, their noise, and the mean error of rounded levels.
 
 A driveline signal is smooth over a few samples at the logger's rate, so its third difference is
 nearly all noise. Blocks in which the signal itself bends sharply stand out and are left out.
-
-Preparation of one channel for the estimates: its samples and their noise.
-
-Mean error of a rounded signal at its levels, by the likelihood of its codes.
 
 A signal that rests at the level L with noise of standard deviation σ reads the code k of the
 rounding step q with the probability

@@ -41,13 +41,13 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import NoisePath
 from drivetwin.estimation.likelihood.noise.shift_response import STATES, build_output_row
 from drivetwin.estimation.likelihood.selection.candidates import check_other_law, collect_loads
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
-from drivetwin.estimation.likelihood.uncertainty.card_numbers import rank_card_numbers
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_laws,
     compute_parameters,
     differentiate,
     list_absolute_ids,
     make_log_id,
+    rank_card_numbers,
 )
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import (
     METHOD,
@@ -56,7 +56,6 @@ from drivetwin.estimation.likelihood.uncertainty.friction_bands import (
 )
 from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.result.assessment import FittedParameters
 from drivetwin.estimation.result.cause import EXPLAINED, WRONG_ENTRY, PredictedSpread
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
@@ -65,21 +64,19 @@ from drivetwin.estimation.result.estimate_set import (
     check_excitation,
     collect_shift_labels,
 )
-from drivetwin.estimation.result.friction_verdict import (
-    adopt_verdicts,
-    assess_friction,
-    report_gains,
-)
-from drivetwin.estimation.result.prior_conflict import PRIOR, report_refined
+from drivetwin.estimation.result.prior_conflict import PRIOR, FittedParameters, report_refined
 from drivetwin.estimation.result.verdict import (
     add_systematic,
+    adopt_verdicts,
     apply_errors,
     assess,
+    assess_friction,
     assess_with_prior,
     compute_correlation,
     from_prior,
     refuse_parameter,
     reject_identified,
+    report_gains,
 )
 from drivetwin.findings import Code, Finding, explain, report
 from drivetwin.parameters import OVER_ETA

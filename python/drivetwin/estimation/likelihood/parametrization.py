@@ -12,11 +12,9 @@ own, with a rise of its own to zero slip:
 
     mu_c = level·mu_c', mu_drop = level·mu_drop' + rest, mu_v = level·mu_v', v_s = v_s'
 
-Ratios of gears and final drive are unknowns unless the card states them exactly.
-
-Table of the effects that a fit may have in its plant beside the dual clutch.
-
-A size that cannot be negative is sought by its logarithm, another by its value.
+Ratios of gears and final drive are unknowns unless the card states them exactly. So are the effects
+that a fit may have in its plant beside the dual clutch: a size that cannot be negative is sought by
+its logarithm, another by its value.
 """
 
 from __future__ import annotations
@@ -41,7 +39,8 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Stribeck,
 )
-from drivetwin.simulation.part_parameters import (
+from drivetwin.simulation.variable import exp
+from drivetwin.simulation.vehicle_parts import (
     BACKLASH,
     MODE_DAMPING,
     MODE_FREQUENCY,
@@ -49,10 +48,10 @@ from drivetwin.simulation.part_parameters import (
     PROGRESSION,
     REFERENCE,
     TYRE_SLIP,
+    VehicleParts,
     build_parts,
+    compute_gap,
 )
-from drivetwin.simulation.variable import exp
-from drivetwin.simulation.vehicle_parts import VehicleParts, compute_gap
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors

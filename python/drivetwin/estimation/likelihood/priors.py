@@ -50,8 +50,7 @@ from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
 from drivetwin.shifts.shift import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw
-from drivetwin.vehicle.distribution import PARTNER_LEVEL_STD, PARTNER_REST_STD
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PARTNER_LEVEL_STD, PARTNER_REST_STD, PriorValue
 
 
 @dataclass(frozen=True)

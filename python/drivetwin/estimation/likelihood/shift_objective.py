@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shifts in the likelihood: residuals of each, and the parts that their plants may have.
-
-Noise of the inputs of a shift: engine torque and pressures.
-"""
+"""Shifts in the likelihood: residuals, noise of the inputs, and the parts that plants may have."""
 
 from __future__ import annotations
 

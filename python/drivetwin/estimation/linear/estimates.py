@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Conclusions of the integral method: estimates, verdicts, curves, warnings and assumptions.
+"""The integral method over all shifts of a log: estimates, verdicts, curves and warnings.
 
-The integral method over all shifts of a log, and what the sensors' tolerances do to it.
+Tolerances of the sensors widen its intervals.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import notify_progress
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.estimation.data.shift_data import (
     DesignData,
     KnownDriveline,
     MeasuredSignal,
     ShiftSignals,
 )
-from drivetwin.estimation.linear.combine_shifts import collect_different_loads, merge_shifts
 from drivetwin.estimation.linear.friction_points import evaluate_fitted_stribeck
 from drivetwin.estimation.linear.load_balance import (
     AERO,
@@ -28,8 +27,12 @@ from drivetwin.estimation.linear.load_balance import (
     find_growth_reference,
     report_different_loads,
 )
-from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
-from drivetwin.estimation.result.assessment import FittedParameters, collect_fill_pressures
+from drivetwin.estimation.linear.pipeline import (
+    IntegralShift,
+    collect_different_loads,
+    identify_shift,
+    merge_shifts,
+)
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
@@ -38,7 +41,11 @@ from drivetwin.estimation.result.estimate_set import (
     collect_shift_labels,
     report_growth,
 )
-from drivetwin.estimation.result.prior_conflict import add_priors
+from drivetwin.estimation.result.prior_conflict import (
+    FittedParameters,
+    add_priors,
+    collect_fill_pressures,
+)
 from drivetwin.estimation.result.verdict import (
     compute_correlation,
     from_prior,

@@ -15,8 +15,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.data.vehicle_balance import (
+from drivetwin.estimation.data.select_shifts import (
     GROWTH,
     INERTIA,
     LOAD,
@@ -24,6 +23,7 @@ from drivetwin.estimation.data.vehicle_balance import (
     VehicleBalance,
     build_recorded_windows,
 )
+from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.regression.errors_in_variables import Fit, Prior
 from drivetwin.estimation.result.cause import SHOWN
 from drivetwin.findings import Code, Finding, Number, report

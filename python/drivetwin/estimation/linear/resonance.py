@@ -5,9 +5,8 @@ Without an output torque the oscillation shows in the gearbox speeds, beside tha
 torque. A decay is accepted only where several windows that start one after the other agree on it;
 anything else is refused.
 
-Least-squares fits of decaying sines on a quadratic trend, many windows at a time.
-
-Variable projection: amplitudes and trend are linear, so that only decay rate and frequency are
+Decaying sines on a quadratic trend are fitted by least squares, many windows at a time. Variable
+projection: amplitudes and trend are linear, so that only decay rate and frequency are
 searched, with the approximate Jacobian of Kaufman (1975) and the damping of Marquardt (1963).
 """
 
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.linear.ringdown_settings import RING_DOWN
+from drivetwin.estimation.linear.ringdown import RING_DOWN
 from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.shift import Shift
 

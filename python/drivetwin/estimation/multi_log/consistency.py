@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Homogeneity test of the logs of a joint fit.
+"""Homogeneity test of the logs of a joint fit, and the verdicts where they disagree.
 
 At the common minimum, g_k is the gradient and F_k the information of log k on the shared unknowns
 θ; its log-specific unknowns are eliminated (Schur complement). In coordinates in which the joint
@@ -12,8 +12,6 @@ is χ² distributed with as many degrees of freedom as there are rows beyond the
 homogeneity test of Cochran (1954) for vectors. Design priors take no part in it. How far each
 parameter would move without one log, in standard deviations of that move, shows the source of an
 inconsistency.
-
-Verdicts under disagreement of the logs, and friction points of all logs.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ from scipy.special import chdtrc
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import Consistency, Identification, LogPull
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
@@ -43,7 +41,6 @@ from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
-from drivetwin.estimation.result.multi_log import Consistency, LogPull
 from drivetwin.estimation.result.verdict import compute_covariance_root, join_reasons
 from drivetwin.findings import Code, explain
 

@@ -20,12 +20,18 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog
-from drivetwin.estimation.identification import Identification, StageResults
+from drivetwin.estimation.identification import (
+    CONSISTENCY,
+    Identification,
+    LogShare,
+    Several,
+    StageResults,
+)
 from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import admit_excluded
@@ -46,7 +52,6 @@ from drivetwin.estimation.multi_log.consistency import (
 )
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.multi_log import CONSISTENCY, LogShare, Several
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
 from drivetwin.parameters import split_log_number
 from drivetwin.vehicle.spec import SensorTolerance

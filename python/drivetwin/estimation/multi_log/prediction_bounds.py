@@ -24,7 +24,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftData
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
-from drivetwin.estimation.likelihood.optimize.staged_start import STAGED_START
+from drivetwin.estimation.likelihood.optimize.multistart import STAGED_START
 from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, START, map_log_names
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm

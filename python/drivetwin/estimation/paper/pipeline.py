@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The paper's procedure on one shift, stage by stage as published.
 
-Gear efficiency η and lumped inertia J′ (eq. 10), the paper's way and in momentum form.
-
-η·T_e - T_o/i_g = J′·ω_e'        J′ = Je + Jo′/i_g²,  Je = J1·η + J2e
-
-Load by the paper's method.
-
-Lock-up oscillation by the paper's method.
-
-Friction curve by the paper's method.
+1. Gear efficiency η and lumped inertia J′ (eq. 10), the paper's way and in momentum form:
+   η·T_e - T_o/i_g = J′·ω_e', with J′ = Je + Jo′/i_g² and Je = J1·η + J2e.
+2. Load.
+3. Lock-up oscillation.
+4. Friction curve.
 """
 
 from __future__ import annotations
@@ -25,12 +21,12 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
 from drivetwin.estimation.linear.friction_points import compute_mean_slip
 from drivetwin.estimation.linear.ringdown import (
+    RING_DOWN,
     RingDown,
     _refuse,
     _select_ring_samples,
     compute_shaft_parameters,
 )
-from drivetwin.estimation.linear.ringdown_settings import RING_DOWN
 from drivetwin.estimation.paper.wlse import (
     GridFit,
     GridRow,
@@ -41,10 +37,9 @@ from drivetwin.estimation.paper.wlse import (
     drop_nan_rows,
     fit_weighted_inertia,
 )
-from drivetwin.estimation.result.assessment import collect_fill_pressures
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
-from drivetwin.estimation.result.prior_conflict import check_range
+from drivetwin.estimation.result.prior_conflict import check_range, collect_fill_pressures
 from drivetwin.estimation.result.verdict import (
     from_prior,
     get_experiment,

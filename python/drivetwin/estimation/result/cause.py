@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cause of a model mismatch that the log shows.
-
-Predicted spread of a simulated signal.
-"""
+"""Cause of a model mismatch that the log shows, and the spread of simulated signals it predicts."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Estimates of one identification, shared by all methods.
-
-Joint distribution of estimates and friction laws, from which models are drawn.
-"""
+"""Estimates of one identification and their joint distribution, shared by all methods."""
 
 from __future__ import annotations
 

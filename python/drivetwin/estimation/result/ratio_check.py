@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivetwin.estimation.data.measured_ratios import measure_ratios
+from drivetwin.estimation.data.prepare import measure_ratios
 from drivetwin.estimation.data.shift_data import ShiftData
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.prior_conflict import report_refined

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Values of a validation: simulated and measured signals, held-out logs.
-
-Agreement of simulation and measurement.
-"""
+"""Values of a validation: simulated and measured signals, their agreement, held-out logs."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from drivetwin.shifts.detect import require_shifts
 from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.simulation.dual_clutch import FloatArray
-from drivetwin.simulation.part_parameters import describe_parts
+from drivetwin.simulation.vehicle_parts import describe_parts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
 

@@ -6,9 +6,27 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from importlib import resources
 
 from drivetwin.export.parameters.content import format_number
 from drivetwin.export.parameters.spelling import make_distinct, to_ascii_line
+
+SLIP_INERTIA = "SlipInertia"
+PAPER_GEAR = "ConstantEfficiencyGear"
+CONVERTER = "TorqueConverter"
+SPRING_TABLE = "SpringTable"
+TYRE = "TyreSlip"
+LOSS_GEAR = "LossTableGear"
+LOSS_PLANETARY = "LossTablePlanetary"
+DRAG = "ClutchDrag"
+VISCOUS = "ViscousCoupling"
+
+
+def read_helper(name: str) -> str:
+    """Return the source of a model by its name."""
+    file = resources.files("drivetwin.export.modelica") / "library" / f"{name}.mo"
+    return file.read_text(encoding="utf-8")
+
 
 _KEYWORDS = re.compile(
     "algorithm|and|annotation|assert|block|break|class|connect|connector|constant|constrainedby|"

@@ -7,7 +7,12 @@ from dataclasses import replace
 
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import (
+    CONVERTER,
+    PAPER_GEAR,
     ROTATIONAL,
+    SPRING_TABLE,
+    TYRE,
+    VISCOUS,
     Component,
     Flanges,
     Modifiers,
@@ -18,12 +23,12 @@ from drivetwin.export.modelica.component import (
 )
 from drivetwin.export.modelica.friction import (
     GROUND,
+    add_planetary_losses,
     build_bearing,
     build_clutch,
+    build_loss_gear,
     build_one_way_clutch,
 )
-from drivetwin.export.modelica.helpers import CONVERTER, PAPER_GEAR, SPRING_TABLE, TYRE, VISCOUS
-from drivetwin.export.modelica.losses import add_planetary_losses, build_loss_gear
 from drivetwin.simulation.network import Element
 
 _COMPONENTS = f"{ROTATIONAL}.Components"

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Friction elements: clutch, brake, one-way clutch and bearing of the Standard Library.
+"""Friction and gears with losses: clutch, brake, one-way clutch, bearing of the Standard Library.
 
-There the torque is cgeo · mu(|w_rel|) · fn_max · f_normalized, at rest up to `peak` times that at
-zero slip: our law with cgeo = gain and fn_max · f_normalized = max(0, P - P0), in numbers of SI.
+The torque of a friction element is cgeo · mu(|w_rel|) · fn_max · f_normalized, at rest up to `peak`
+times that at zero slip: our law with cgeo = gain and fn_max · f_normalized = max(0, P - P0), in
+numbers of SI.
 """
 
 from __future__ import annotations
@@ -13,8 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from drivetwin.errors import InputError
 from drivetwin.export.modelica.component import (
+    DRAG,
+    LOSS_GEAR,
+    LOSS_PLANETARY,
     ROTATIONAL,
+    SLIP_INERTIA,
     Component,
     Flanges,
     Names,
@@ -22,11 +28,56 @@ from drivetwin.export.modelica.component import (
     format_matrix,
     format_values,
 )
-from drivetwin.export.modelica.helpers import SLIP_INERTIA
-from drivetwin.export.modelica.losses import add_drag
 from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.simulation.network import Element
+
+
+def build_loss_gear(element: Element, names: Names) -> Part:
+    """Build a gear with a table of losses. Raises InputError if it has a loss law beside it."""
+    if element.get("loss") is not None:
+        raise InputError(
+            f"{element['name']}: a gear with both 'loss' and 'losses' has no Modelica translation",
+            "export it with one of them, or put the table on a gear of ratio 1 beside it",
+        )
+    modifiers = (*format_values(ratio=element["ratio"]), _format_losses(element["losses"]))
+    flanges = (("flange_a", element["a"]), ("flange_b", element["b"]))
+    gear = Component(LOSS_GEAR, names.elements[element["name"]], modifiers, flanges)
+    return Part((gear,), helpers=frozenset({LOSS_GEAR}))
+
+
+def add_planetary_losses(part: Part, losses: Mapping[str, Any] | None) -> Part:
+    """Put a table of losses on the planetary set that a part begins with."""
+    if losses is None:
+        return part
+    gears, *others = part.components
+    modifiers = (*gears.modifiers, _format_losses(losses))
+    lossy = replace(gears, type=LOSS_PLANETARY, modifiers=modifiers)
+    return replace(part, components=(lossy, *others), helpers=frozenset({LOSS_PLANETARY}))
+
+
+def add_drag(part: Part, element: Element, names: Names) -> Part:
+    """Put the drag of a clutch beside it."""
+    table = element.get("drag")
+    if table is None:
+        return part
+    rows = [(0.0, 0.0), *zip(table["slip"], table["torque"], strict=True)]
+    flanges = (("flange_a", element["a"]), ("flange_b", element["b"]))
+    name = f"{names.elements[element['name']]}_drag"
+    drag = Component(DRAG, name, (("drag", format_matrix(rows)),), flanges)
+    return replace(part, components=(*part.components, drag), helpers=part.helpers | {DRAG})
+
+
+def _format_losses(losses: Mapping[str, Any]) -> tuple[str, str]:
+    """Format the table from standstill on, over torques of both signs."""
+    rows = [
+        (float(t), 0.0, *loss) for t, loss in zip(losses["torque"], losses["loss"], strict=True)
+    ]
+    if rows[0][0] >= 0.0:
+        mirrored = [(-torque, *loss) for torque, *loss in reversed(rows) if torque > 0.0]
+        rows = [*mirrored, *rows]
+    return "losses", format_matrix([(0.0, 0.0, *losses["speed"]), *rows])
+
 
 GROUND = "ground"
 _FULL_PRESSURE = 1e6

@@ -25,10 +25,10 @@ from drivetwin.export.modelica.component import (
     format_string,
     make_identifier,
     make_identifiers,
+    read_helper,
 )
 from drivetwin.export.modelica.elements import build_part
 from drivetwin.export.modelica.friction import GROUND
-from drivetwin.export.modelica.helpers import read_helper
 from drivetwin.export.modelica.inputs import (
     Inputs,
     format_equations,
@@ -37,8 +37,7 @@ from drivetwin.export.modelica.inputs import (
 )
 from drivetwin.export.parameters.content import format_number
 from drivetwin.export.subject import Subject
-from drivetwin.simulation.driveline import build_driveline
-from drivetwin.simulation.driveline_start import build_start
+from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal
 from drivetwin.simulation.element_schema import list_ports
 from drivetwin.simulation.network import Element, Start

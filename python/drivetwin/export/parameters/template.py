@@ -14,11 +14,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from drivetwin._util.spelling import suggest_spelling
 from drivetwin._util.toml import Fault, StrictModel, raise_faults, read_toml, validate_schema
-from drivetwin.channels.shiftlog import FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import find_unit, get_time_factor, is_time_unit, list_first_spellings
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.parameters.spelling import (

@@ -11,7 +11,7 @@ from typing import Any
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.logs.formats.parquet import ParquetRecording
-from drivetwin.logs.raw import LogFormat, Recording
+from drivetwin.logs.raw import Recording
 
 _KIND = "an Arrow file"
 
@@ -39,6 +39,3 @@ class _Table:
         wanted = [k for k, name in enumerate(self.schema_arrow.names) if name in columns]
         options = self._ipc.IpcReadOptions(included_fields=wanted)
         return self._ipc.open_file(self._file, options=options).read_all()
-
-
-ARROW_FORMAT = LogFormat(open_arrow, (".feather", ".arrow"), (b"ARROW1",), guarded=True)

@@ -31,7 +31,13 @@ from drivetwin.errors import DamagedChannelError, TimeError, Where
 from drivetwin.logs.formats.cell_text import is_time_text, parse_time_texts
 from drivetwin.logs.formats.long_table import find_long_layout, read_long
 from drivetwin.logs.formats.table_columns import TableColumns, parse_table_columns, unpack_clock
-from drivetwin.logs.formats.table_head import TableHead, find_table_head, is_remark_name
+from drivetwin.logs.formats.table_head import (
+    TableHead,
+    TextFile,
+    find_table_head,
+    is_remark_name,
+    open_text,
+)
 from drivetwin.logs.formats.table_scan import (
     Numbers,
     TableReader,
@@ -40,9 +46,7 @@ from drivetwin.logs.formats.table_scan import (
     make_numbers,
     number_lines,
 )
-from drivetwin.logs.formats.text_file import TextFile, open_text
 from drivetwin.logs.raw import (
-    LogFormat,
     RawChannel,
     Recording,
     Window,
@@ -68,9 +72,6 @@ def open_csv(path: Path, options: ReadOptions) -> Iterator[Recording]:
     """Open a text log; see `CsvRecording`."""
     with path.open("rb") as source:
         yield read_table(source, str(path), options.time)
-
-
-CSV_FORMAT = LogFormat(open_csv, (".csv", ".txt", ".tsv", ".dat", ".lvm", ".msl", ".vbo"))
 
 
 def read_table(source: BinaryIO, file: str, time: TimeColumn) -> Recording:

@@ -4,37 +4,74 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.arrow import ARROW_FORMAT
-from drivetwin.logs.formats.can.open import BLF_FORMAT, BUS_TEXT_FORMAT
 from drivetwin.logs.formats.can.other_tools import refuse_bus_tool
-from drivetwin.logs.formats.csv import CSV_FORMAT
 from drivetwin.logs.formats.guarded import open_guarded
-from drivetwin.logs.formats.mat import MAT_FORMAT
-from drivetwin.logs.formats.mdf import MDF_FORMAT
-from drivetwin.logs.formats.parquet import PARQUET_FORMAT
-from drivetwin.logs.raw import LogFormat, Recording
+from drivetwin.logs.raw import HEAD_BYTES, Opener, Recording
 
+
+@dataclass(frozen=True)
+class LogFormat:
+    """Registered format of logs.
+
+    A file has it if it starts with one of `starts`, or if `recognises` is True for its first
+    bytes. A folder is searched for files with its `endings`. With `guarded` the file is read in a
+    child process, because the library trusts damaged bytes.
+
+    `opener` and `recognises` name functions of modules of this folder, such as `mdf.open_mdf`. A
+    module is imported when a file may have its format.
+    """
+
+    opener: str
+    endings: tuple[str, ...]
+    starts: tuple[bytes, ...] = ()
+    recognises: str | None = None
+    guarded: bool = False
+
+    def load_opener(self) -> Opener:
+        """Import the function that opens a file."""
+        opener: Opener = _import_function(self.opener)
+        return opener
+
+    def fits(self, head: bytes) -> bool:
+        """Return whether a file with these first bytes and no mark has the format."""
+        return self.recognises is not None and bool(_import_function(self.recognises)(head))
+
+
+def _import_function(name: str) -> Any:
+    module, _, function = name.rpartition(".")
+    return getattr(import_module(f"drivetwin.logs.formats.{module}"), function)
+
+
+_CSV = LogFormat("csv.open_csv", (".csv", ".txt", ".tsv", ".dat", ".lvm", ".msl", ".vbo"))
 FORMATS: tuple[LogFormat, ...] = (
-    MDF_FORMAT,
-    MAT_FORMAT,
-    PARQUET_FORMAT,
-    ARROW_FORMAT,
-    BLF_FORMAT,
-    BUS_TEXT_FORMAT,
-    CSV_FORMAT,
+    LogFormat("mdf.open_mdf", (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), guarded=True),
+    LogFormat(
+        "mat.open_mat",
+        (".mat",),
+        (b"MATLAB 5.0", b"MATLAB 7.3"),
+        recognises="mat.is_version4",
+        guarded=True,
+    ),
+    LogFormat("parquet.open_parquet", (".parquet",), (b"PAR1",), guarded=True),
+    LogFormat("arrow.open_arrow", (".feather", ".arrow"), (b"ARROW1",), guarded=True),
+    LogFormat("can.open.open_blf", (".blf",), (b"LOGG",), guarded=True),
+    LogFormat(
+        "can.open.open_bus_text", (".asc", ".trc", ".log"), recognises="can.texts.is_bus_text"
+    ),
+    _CSV,
 )
 """Formats in the order in which they are tried; a file that none of them recognises is CSV."""
 
 SUFFIXES = frozenset(ending for one in FORMATS for ending in one.endings)
 """Endings by which a folder's logs are known; a file that is named by itself may have any."""
-
-_HEAD = 8192
-"""Number of bytes used to detect a format."""
 
 _REFUSED = {
     b"\x89HDF": "an HDF5 file without MATLAB header",
@@ -61,15 +98,15 @@ def open_recording(
     measure_regular_file(path, FileFormatError)
     try:
         with path.open("rb") as file:
-            head = file.read(_HEAD)
+            head = file.read(HEAD_BYTES)
     except OSError as fault:
         what = f"cannot read the file: {fault.strerror}"
         raise FileFormatError(what, "check the path", Where(file=str(path))) from None
     chosen = _select_format(head, path)
     options = options or ReadOptions()
     if chosen.guarded:
-        return open_guarded(chosen.opener, path, options)
-    return chosen.opener(path, options)
+        return open_guarded(chosen.load_opener(), path, options)
+    return chosen.load_opener()(path, options)
 
 
 def _select_format(head: bytes, path: Path) -> LogFormat:
@@ -85,7 +122,7 @@ def _select_format(head: bytes, path: Path) -> LogFormat:
                 Where(file=str(path)),
             )
     for one in FORMATS:
-        if one.recognises(head):
+        if one.fits(head):
             return one
     refuse_bus_tool(head, path)
-    return CSV_FORMAT
+    return _CSV

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.raw import describe_origin, find_origin, subtract_origin
 
 
@@ -59,6 +60,15 @@ class Message:
 PAYLOAD, LONGEST = 8, 64
 """Most data bytes of a classical frame, and of one of CAN FD."""
 
+EXTENDED_BIT = 1 << 31
+"""Bit of an identifier by which files mark 29 bits."""
+
+LARGEST_IDENTIFIER = {False: 0x7FF, True: 0x1FFFFFFF}
+"""Largest identifier of a standard and of an extended frame."""
+
+FrameRow = tuple[float, int, bool, bytes, str]
+"""Time stamp [s], identifier, whether it is extended, payload and bus of a data frame."""
+
 FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 """Data bytes by the length code of CAN FD."""
 
@@ -107,3 +117,40 @@ def build_frames(
         buses=names,
         warnings=(*warnings, *describe_origin(origin)),
     )
+
+
+def collect_frames(
+    rows: Sequence[FrameRow], file: str, *, lines: int, other: int = 0, notes: tuple[str, ...] = ()
+) -> Frames:
+    """Build the table from the data frames of a file.
+
+    Parameters
+    ----------
+    rows
+        Data frames in file order.
+    file
+        File, for messages.
+    lines
+        Number of lines or messages of the file that are meant as frames.
+    other
+        Number of remote and error frames among them; the rest is damaged.
+    notes
+        Further warnings.
+
+    Returns
+    -------
+    Frames
+        The frames; its warnings count what was left out.
+
+    Raises
+    ------
+    FileFormatError
+        Without a single frame.
+    """
+    if not rows:
+        raise FileFormatError("no frame in the file", "record it again", Where(file=file))
+    warnings = [f"{other} remote or error frames left out"] if other else []
+    if damaged := lines - other - len(rows):
+        warnings.append(f"{damaged} damaged lines left out of {lines}")
+    stamps, identifiers, extended, payloads, buses = zip(*rows, strict=True)
+    return build_frames(stamps, identifiers, extended, payloads, buses, (*warnings, *notes))

@@ -24,11 +24,12 @@ from drivetwin.errors import FileFormatError, TimeError, Where
 from drivetwin.logs.formats.cell_text import (
     Meaning,
     classify_text,
+    is_clock,
     is_number,
     is_time_text,
     parse_time_texts,
 )
-from drivetwin.logs.formats.table_head import TableHead, is_remark_name
+from drivetwin.logs.formats.table_head import TableHead, TextFile, is_remark_name
 from drivetwin.logs.formats.table_scan import (
     FIRST_TEXT,
     OTHER_TEXT,
@@ -38,8 +39,6 @@ from drivetwin.logs.formats.table_scan import (
     make_numbers,
     number_lines,
 )
-from drivetwin.logs.formats.text_file import TextFile
-from drivetwin.logs.quality.clock_drift import is_clock
 from drivetwin.logs.raw import RawChannel, RawLog, describe_origin, find_origin, subtract_origin
 
 _NAME_WORDS = frozenset(

@@ -25,10 +25,8 @@ import numpy as np
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, MissingChannelError, ReaderFailureError, Where
-from drivetwin.logs.formats.mat_signals import Signals, find_signals
-from drivetwin.logs.formats.parser_limits import compute_parser_limits
+from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.logs.raw import (
-    LogFormat,
     RawLog,
     Recording,
     describe_origin,
@@ -60,25 +58,27 @@ def open_mat(path: Path, options: ReadOptions) -> Iterator[Recording]:
     Raises MissingExtraError (v7.3 without pymatreader), FileFormatError for a damaged file or one
     with closed objects only, MissingChannelError without any time vector, UnitError.
     """
+    from drivetwin.logs.formats.mat_signals import find_signals  # not needed to recognise a file
+
     with path.open("rb") as file:
         is_hdf5 = file.read(10) == b"MATLAB 7.3"
     with handle_parser_errors(_KIND, path):
         tree = _read_hdf5_tree(path) if is_hdf5 else _read_tree(path)
         found = find_signals(tree, options.time, str(path))
     if not found.channels:
-        raise _make_no_signal_error(tree, found, path)
+        raise _make_no_signal_error(tree, found.unreadable, path)
     origin = find_origin(channel.time[0] for channel in found.channels)
     channels = tuple(replace(one, time=subtract_origin(one.time, origin)) for one in found.channels)
     yield RawLog(channels, found.unreadable, describe_origin(origin), str(path))
 
 
 def _make_no_signal_error(
-    tree: Mapping[str, Any], found: Signals, path: Path
+    tree: Mapping[str, Any], unreadable: Mapping[str, str], path: Path
 ) -> FileFormatError | MissingChannelError:
     where = Where(file=str(path))
     if not tree:
         return FileFormatError("the file holds no variables", _PLAIN, where)
-    reasons = "; ".join(f"{name}: {why}" for name, why in found.unreadable.items())
+    reasons = "; ".join(f"{name}: {why}" for name, why in unreadable.items())
     what = f"no variable has a time vector among {', '.join(list(tree)[:20])}"
     return MissingChannelError(f"{what} ({reasons})" if reasons else what, _PLAIN, where)
 
@@ -201,8 +201,3 @@ def _check_version4(path: Path) -> None:
                     "the file is damaged or was not copied whole: export it again",
                     Where(file=str(path)),
                 )
-
-
-MAT_FORMAT = LogFormat(
-    open_mat, (".mat",), (b"MATLAB 5.0", b"MATLAB 7.3"), recognises=is_version4, guarded=True
-)

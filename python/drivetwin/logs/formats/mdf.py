@@ -27,10 +27,9 @@ from drivetwin.logs.formats.can.mdf_frames import has_only_frames, read_bus_fram
 from drivetwin.logs.formats.can.open import decode_recording
 from drivetwin.logs.formats.cell_text import parse_numbers, select_numbers
 from drivetwin.logs.formats.frames import Frames
-from drivetwin.logs.formats.mdf_integrity import check_blocks
+from drivetwin.logs.formats.mdf_integrity import MOST_INFLATION, check_blocks
 from drivetwin.logs.raw import (
     Joined,
-    LogFormat,
     RawChannel,
     Recording,
     Window,
@@ -51,9 +50,6 @@ _MOST_KEPT = 1 << 30
 
 _FINISHED = b"MDF     "
 _OPTIONS = {"process_bus_logging": False, "use_display_names": False}
-_MOST_INFLATION = 1100
-"""Deflate packs zeros about 1030 to 1; a group that claims more than this is damaged."""
-
 
 _LISTED = 8
 """Largest number of texts of a table that are listed."""
@@ -96,9 +92,6 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
             yield _merge_bus_frames(signals, frames, options, path)
         finally:
             mdf.close()
-
-
-MDF_FORMAT = LogFormat(open_mdf, (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), guarded=True)
 
 
 def _merge_bus_frames(
@@ -300,7 +293,7 @@ class MdfRecording:
         records = int(block.cycles_nr)
         width = max(1, int(block.samples_byte_nr))
         size = self._path.stat().st_size
-        if records * width > _MOST_INFLATION * size + 1_000_000 or records < 0:
+        if records * width > MOST_INFLATION * size + 1_000_000 or records < 0:
             raise FileFormatError(
                 f"group {name!r} claims {records} records in a file of {size} bytes",
                 "the file is cut or damaged: record or export the log again",

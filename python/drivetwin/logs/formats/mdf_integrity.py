@@ -16,8 +16,8 @@ from pathlib import Path
 from drivetwin.errors import FileFormatError, Where
 
 _HEADER4 = 64
-_MOST_INFLATION = 1100
-"""Deflate packs zeros about 1030 to 1; a block that claims more is damaged."""
+MOST_INFLATION = 1100
+"""Deflate packs zeros about 1030 to 1; a block or group that claims more is damaged."""
 
 _LINKS4: dict[bytes, dict[int, bytes]] = {
     b"##HD": {0: b"##DG", 5: b""},
@@ -192,6 +192,6 @@ def _measure_block_data(data: mmap.mmap, place: int) -> int | str:
     if block.body + 24 > block.end:
         return f"the packed data at byte {place} are cut short"
     original, packed = struct.unpack_from("<QQ", data, block.body + 8)
-    if block.body + 24 + packed > len(data) or original > _MOST_INFLATION * packed + 1024:
+    if block.body + 24 + packed > len(data) or original > MOST_INFLATION * packed + 1024:
         return f"packed data at byte {place} claim {original} bytes from {packed}"
     return int(original)

@@ -19,7 +19,6 @@ from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where
 from drivetwin.logs.raw import (
-    LogFormat,
     RawChannel,
     Recording,
     Window,
@@ -55,9 +54,6 @@ def open_parquet(path: Path, options: ReadOptions) -> Iterator[Recording]:
         yield recording
     finally:
         table.close()
-
-
-PARQUET_FORMAT = LogFormat(open_parquet, (".parquet",), (b"PAR1",), guarded=True)
 
 
 class ParquetRecording:

@@ -22,8 +22,14 @@ from drivetwin.logs.formats.cell_text import (
     describe_text,
     is_number,
 )
-from drivetwin.logs.formats.table_head import BLANKS, TableHead, split_line
-from drivetwin.logs.formats.text_file import EXPORT, TextFile, make_binary_error
+from drivetwin.logs.formats.table_head import (
+    BLANKS,
+    EXPORT,
+    TableHead,
+    TextFile,
+    make_binary_error,
+    split_line,
+)
 
 _NUMBER, _BLANK, FIRST_TEXT, OTHER_TEXT = 0, 1, 2, 255
 """Kinds of cells: a number, nothing, the first of the texts, a text beyond those kept."""

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.arrays import SHORTEST_STEP
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
-from drivetwin._util.time_steps import SHORTEST_STEP
-from drivetwin.channels.roles import AUXILIARY
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.channels.roles import AUXILIARY, Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.findings import Code, Finding, Number, report

@@ -1,19 +1,71 @@
 # SPDX-License-Identifier: MIT
-"""Consistency checks between channels of a log: common clock, speeds, gear ratios, torques."""
+"""Consistency checks of the channels of a log: rasters and fillings, common clock, gear ratios."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.channels.filling import Filling, FillKind
 from drivetwin.channels.roles import AUXILIARY, get_quantity
 from drivetwin.channels.shiftlog import Channel, find_uncovered_ends
 from drivetwin.errors import PlausibilityError, TimeError, Where
 from drivetwin.findings import Code, Finding, Number, report
-from drivetwin.logs.quality.time_alignment import SIGNIFICANT, estimate_final_drive
+from drivetwin.logs.quality.time_alignment import IN_GEAR, SIGNIFICANT, estimate_final_drive
 from drivetwin.vehicle.spec import Z95
 from drivetwin.vehicle.vehicle_card import VehicleCard
+
+_COARSE = 2.1e-3
+"""Step of a table [s] above which it matters how much later than its message a value is shown: with
+rows of 2 ms, however their stamps are rounded, its time is known to a millisecond and better."""
+
+
+def replace_filling(channel: Channel, filling: Filling | None) -> tuple[Channel, list[Finding]]:
+    """Reduce a channel that was filled up to its measured samples; return it and findings.
+
+    Comes before all other checks, which assume the noise of measured samples.
+    """
+    if filling is None:
+        return channel, []
+    if filling.kind is FillKind.UNKNOWN:
+        return replace(channel, filling=filling), [report(Code.FILLING_UNKNOWN, "", channel.place)]
+    period, step = Number(filling.period, "s"), Number(filling.step, "s")
+    measured = replace(channel, time=filling.time, values=filling.values, filling=filling)
+    return measured, [
+        report(
+            Code.CHANNEL_FILLED,
+            "",
+            channel.place,
+            period=period,
+            step=step,
+            kind=filling.kind.value,
+        )
+    ]
+
+
+def mark_late_samples(channels: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
+    """Mark channels as `late` that a coarse table repeats; return them by role, and findings.
+
+    The arrival of their messages within a row is unknown. Channels with stamps of their own have
+    those of the messages.
+    """
+    measured = {role: one for role, one in channels.items() if one.quantity not in AUXILIARY}
+    held = [one for one in measured.values() if one.held]
+    if not held:
+        return dict(channels), []
+    rows = max(measured.values(), key=lambda one: one.time.size)
+    if rows.step <= _COARSE:
+        return dict(channels), []
+    recorded = [one for one in measured.values() if one.filling is None]
+    if not all(np.isin(one.time, rows.time).all() for one in recorded):
+        return dict(channels), []
+    names = ", ".join(repr(one.source_name) for one in held)
+    aged = {role: replace(one, late=rows.step) for role, one in measured.items()}
+    step = Number(rows.step, "s")
+    return {**channels, **aged}, [report(Code.TABLE_ROWS_COARSE, step=step, channels=names)]
+
 
 STARTS_APART = 0.05
 """The groups of a recording start and end so far apart [s]."""
@@ -40,8 +92,8 @@ The limits leave room for both; a factor of two, as of a wrong scale, is outside
 LEAST_LOAD = 0.2
 """Share of the largest engine torque above which the balance is looked at."""
 
-IN_GEAR, LEAST_SAMPLES = 0.01, 20
-"""Relative tolerance of the ratio of an engaged gear, and least number of samples in gear."""
+LEAST_SAMPLES = 20
+"""Least number of samples in gear."""
 
 OPPOSED = -0.5
 """Normalised product of two torques below which one has the wrong sign."""

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.findings import Code
 from drivetwin.logs.quality.outliers import Damage

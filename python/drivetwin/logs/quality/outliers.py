@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
+from drivetwin._util.arrays import compute_median_step
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
-from drivetwin._util.time_steps import compute_median_step
-from drivetwin.channels.shiftlog import FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import Where
 from drivetwin.findings import Code, Finding, report
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from drivetwin.estimation.result.estimate import FrictionCurve
-from drivetwin.report.decimate import MAX_POINTS
 from drivetwin.report.figure import Entry, Figure, make_trace
+from drivetwin.report.figures.stack import MAX_POINTS
 from drivetwin.report.style import COMPARED, FITTED, MEASURED, make_axis, make_layout
 
 _BAND = "rgba(213,94,0,0.18)"

@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display
-from drivetwin.channels.shiftlog import Channel, Quantity, ShiftLog
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import (
     Curve,

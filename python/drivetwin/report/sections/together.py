@@ -8,15 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivetwin._util.display_units import Display, format_significant, get_display_unit
-from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.estimate import Estimate
-from drivetwin.estimation.result.multi_log import (
+from drivetwin.estimation.identification import (
     CONSISTENCY,
     Consistency,
+    Identification,
     LogPull,
     LogShare,
     Several,
 )
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.validation import HeldOut, Outcome, Validation
 from drivetwin.findings import render
 from drivetwin.parameters import split_log_number

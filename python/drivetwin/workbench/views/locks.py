@@ -10,17 +10,31 @@ from dash import ALL, Input, State, ctx, html, set_props
 from dash.development.base_component import Component
 
 from drivetwin._util.display_units import get_display_unit
+from drivetwin.errors import InputError, Where
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import Cell, make_table
 from drivetwin.report.labels import get_parameter_label, get_parameter_name
 from drivetwin.report.sections.parameters import build_parameter_table
 from drivetwin.vehicle.locks import Lock, LockKind, can_fix
-from drivetwin.workbench.locks import parse_lock
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import ControlId, get_triggered_part
+
+
+def parse_lock(parameter_id: str, kind: LockKind, value: float | None, std: float | None) -> Lock:
+    """The lock of numbers in display units; None where a field is empty.
+
+    Raises InputError where no value is stated that is needed.
+    """
+    if kind is LockKind.FREE:
+        return Lock(kind)
+    if value is None:
+        raise InputError("no value is stated", "type one first", Where(key=parameter_id))
+    factor = get_display_unit(get_parameter_spec(parameter_id).unit).factor
+    return Lock(kind, value / factor, (std or 0.0) / factor)
+
 
 _KINDS = {kind.value: kind.value for kind in LockKind}
 HINT = (

@@ -17,9 +17,9 @@ from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
     NoConvergence,
     fit_local,
+    fit_lower_gear_only,
     fit_multistart,
 )
-from drivetwin.estimation.likelihood.optimize.staged_start import fit_lower_gear_only
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem, truth_of
 from tests.support.bench import Knowledge, record_bench

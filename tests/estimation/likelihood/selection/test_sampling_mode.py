@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.fit import LikelihoodFit

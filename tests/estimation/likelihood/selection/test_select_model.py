@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
-from drivetwin.channels.shiftlog import Quantity
+from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario

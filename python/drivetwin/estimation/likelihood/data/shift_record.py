@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Data of one shift for the fit: simulation inputs and the compared outputs.
 
-Quantization errors of an input that its own noise does not dither.
-
-While a torque or pressure stays at a level the error stays too: its mean over that time is as far
+Quantization errors are noise of an input that its own noise does not dither. While a torque or
+pressure stays at a level the error stays too: its mean over that time is as far
 off as one sample, and noise of the same size that comes and goes from sample to sample would be far
 less. Each stay has an error of its own, so what it does is that of white noise of the same power
 there.

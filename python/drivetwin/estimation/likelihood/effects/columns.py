@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.pressure_roles import get_pressure_element
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.effect import (

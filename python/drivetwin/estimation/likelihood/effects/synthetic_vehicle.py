@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import integrate_trapezoids
+from drivetwin.simulation.driveline import settle
 from drivetwin.simulation.driveline_run import DrivelineTask
-from drivetwin.simulation.driveline_start import settle
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     ShiftElement,

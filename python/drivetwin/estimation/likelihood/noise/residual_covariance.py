@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Covariance of the residuals, R + G·U·Gᵀ, in factored form.
+"""Covariance of the residuals, R + G·U·Gᵀ, in factored form, and the linear response G of a run.
 
 A residual is sensor noise R plus what the noise U of the inputs, sent through the simulation (G),
 does to its outputs. The driveline has S states, so G·U·Gᵀ is that of a Markov process z driven by
@@ -20,8 +20,6 @@ does, and (1 - G·S)⁻¹ times the residual has the covariance above, with G th
 torque follows its own speed (a Kalman filter with correlated noise: Anderson and Moore 1979).
 An input's noise acts on the driveline through its power per frequency only, since the driveline
 passes less than half the sampling rate: a sample's variance times the sampling time.
-
-Discrete linear response of a run to small disturbances of its states and inputs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Initial values of the fit: from the linear method if it estimated them, else typical ones.
 
-Initial values from speeds and engine torque alone; torque-like values are divided by η.
-
 Without an output torque only ratios over η are identifiable (THEORY section 6). With η = 1 the
 model's parameters are these ratios. Their initial values follow from:
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
 from drivetwin.estimation.likelihood.data.input_smoothing import SMOOTHING
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors

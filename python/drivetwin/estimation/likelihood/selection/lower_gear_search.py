@@ -18,9 +18,10 @@ from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluat
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.shaft import ROUNDING
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
-from drivetwin.estimation.likelihood.optimize.staged_start import (
+from drivetwin.estimation.likelihood.optimize.multistart import (
+    MULTI_START,
     find_staged_start,
+    fit_local,
     fit_lower_gear_only,
 )
 from drivetwin.estimation.likelihood.selection.plants import (

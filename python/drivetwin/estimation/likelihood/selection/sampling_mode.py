@@ -35,8 +35,11 @@ from drivetwin.estimation.likelihood.column_products import compute_column_produ
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
-from drivetwin.estimation.likelihood.optimize.staged_start import fit_lower_gear_only
+from drivetwin.estimation.likelihood.optimize.multistart import (
+    MULTI_START,
+    fit_local,
+    fit_lower_gear_only,
+)
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.timed_stages import TimedStages
+from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.pressure_roles import make_pressure_role
+from drivetwin.channels.roles import make_pressure_role
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import build_sensor_columns, observe
 from drivetwin.estimation.likelihood.effects.effect import evaluate_operating_point

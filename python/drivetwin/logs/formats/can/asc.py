@@ -12,8 +12,14 @@ from itertools import takewhile
 
 import numpy as np
 
-from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import LONGEST, PAYLOAD, Frames, build_frames
+from drivetwin.logs.formats.frames import (
+    LARGEST_IDENTIFIER,
+    LONGEST,
+    PAYLOAD,
+    FrameRow,
+    Frames,
+    collect_frames,
+)
 
 _STAMP = rb"[-+]?\d{1,12}[.,]\d{1,9}"
 _WAY = rb"(?:Rx|Tx|TxRq)"
@@ -56,14 +62,9 @@ _OTHER = re.compile(
 )
 """Remote requests and error frames: lines of a sound file that carry no signal."""
 
-_MOST = {False: 0x7FF, True: 0x1FFFFFFF}
-"""Largest identifier of a standard and of an extended frame."""
-
 _HEXADECIMAL = re.compile(rb"[0-9A-Fa-f]+")
 _DECIMALS = 9
 """Most decimals of a stamp in seconds."""
-
-_Row = tuple[int, float, int, bool, bytes, str]
 
 
 def is_asc(head: bytes) -> bool:
@@ -78,22 +79,19 @@ def read_asc(data: bytes, file: str) -> Frames:
     FileFormatError without a single frame.
     """
     head = data[:_HEAD]
-    rows = list(_parse_rows(data, 10 if _DECIMAL.search(head) else 16))
-    if not rows:
-        raise FileFormatError("no frame in the file", "record it again", Where(file=file))
-    other = len(_OTHER.findall(data))
-    damaged = len(_ANY.findall(data)) - other - len(rows)
-    warnings = []
-    if other:
-        warnings.append(f"{other} remote or error frames left out")
-    if damaged:
-        warnings.append(f"{damaged} damaged lines left out of {damaged + other + len(rows)}")
-    places, stamps, identifiers, extended, payloads, buses = zip(*rows, strict=True)
-    if _RELATIVE.search(head):
+    places, rows = [], []
+    for place, row in _parse_rows(data, 10 if _DECIMAL.search(head) else 16):
+        places.append(place)
+        rows.append(row)
+    lines, other = len(_ANY.findall(data)), len(_OTHER.findall(data))
+    notes = []
+    if rows and _RELATIVE.search(head):
         stamps = _add_up_stamps(data, places)
+        rows = [(stamp, *row[1:]) for stamp, row in zip(stamps, rows, strict=True)]
         note = "time stamps from event to event added up"
-        warnings.append(f"{note}; after a damaged line they are early" if damaged else note)
-    return build_frames(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+        is_damaged = lines > other + len(rows)
+        notes.append(f"{note}; after a damaged line they are early" if is_damaged else note)
+    return collect_frames(rows, file, lines=lines, other=other, notes=tuple(notes))
 
 
 def _add_up_stamps(data: bytes, places: Sequence[int]) -> tuple[float, ...]:
@@ -104,8 +102,8 @@ def _add_up_stamps(data: bytes, places: Sequence[int]) -> tuple[float, ...]:
     return tuple(time[np.searchsorted(starts, places)].tolist())
 
 
-def _parse_rows(data: bytes, base: int) -> Iterator[_Row]:
-    """Place, time [s], identifier, whether it is extended, payload and bus of each sound line."""
+def _parse_rows(data: bytes, base: int) -> Iterator[tuple[int, FrameRow]]:
+    """Yield the place of each sound line and its frame."""
     part = _BYTES[base]
     line = re.compile(
         b"^[ \t]*(?P<time>" + _STAMP + b")[ \t]+(?:"
@@ -122,9 +120,9 @@ def _parse_rows(data: bytes, base: int) -> Iterator[_Row]:
             length = min(_parse_number(code, base), PAYLOAD)
         payload = _parse_payload(digits, base)[:length]
         identifier, extended = _parse_identifier(name, number, base)
-        if len(payload) == length <= LONGEST and 0 <= identifier <= _MOST[extended]:
+        if len(payload) == length <= LONGEST and 0 <= identifier <= LARGEST_IDENTIFIER[extended]:
             bus_name = f"channel {int(bus) - 1}"
-            yield match.start(), _parse_stamp(time), identifier, extended, payload, bus_name
+            yield match.start(), (_parse_stamp(time), identifier, extended, payload, bus_name)
 
 
 def _parse_stamp(text: bytes) -> float:

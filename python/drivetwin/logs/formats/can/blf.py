@@ -11,8 +11,8 @@ import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
+from drivetwin.errors import FileFormatError
+from drivetwin.logs.formats.frames import LONGEST, FrameRow, Frames, collect_frames
 
 _RANGE = 2.0**64 * 1e-9
 """Time [s] after which 64 bits of nanoseconds start again."""
@@ -28,7 +28,7 @@ def read_blf(path: Path) -> Frames:
 
 def _read_frames(reader: Any, kind: str, path: Path) -> Frames:
     """The table of data frames; what breaks off is read up to there."""
-    frames: list[tuple[float, int, bool, bytes, str]] = []
+    frames: list[FrameRow] = []
     left_out = 0
     warnings: list[str] = []
     try:
@@ -38,18 +38,13 @@ def _read_frames(reader: Any, kind: str, path: Path) -> Frames:
         if not frames:
             raise
         warnings.append(f"{fault.what}; {len(frames)} frames were read before")
-    if not frames:
-        raise FileFormatError("no frame in the file", "record it again", Where(file=str(path)))
-    if left_out:
-        warnings.append(f"{left_out} remote or error frames left out")
-    stamps, identifiers, extended, payloads, buses = zip(*frames, strict=True)
-    stamps = tuple(_count_from_start(stamps, reader.start_timestamp).tolist())
-    return build_frames(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+    stamps = _count_from_start([row[0] for row in frames], reader.start_timestamp).tolist()
+    rows = [(stamp, *row[1:]) for stamp, row in zip(stamps, frames, strict=True)]
+    total = len(rows) + left_out
+    return collect_frames(rows, str(path), lines=total, other=left_out, notes=tuple(warnings))
 
 
-def _collect_frames(
-    reader: Iterable[Any], frames: list[tuple[float, int, bool, bytes, str]]
-) -> int:
+def _collect_frames(reader: Iterable[Any], frames: list[FrameRow]) -> int:
     """Append the data frames; return how many others there were."""
     left_out = 0
     for message in reader:

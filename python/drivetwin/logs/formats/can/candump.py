@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
+from drivetwin.logs.formats.frames import LONGEST, FrameRow, Frames, collect_frames
 
 _STAMP = rb"^[ \t]*\((?P<time>(?:\d{4}-\d{2}-\d{2} \d{2}:\d{2}:)?-?\d{1,12}\.\d{1,9})\)[ \t]+"
 _LINE = re.compile(
@@ -48,11 +48,7 @@ def read_candump(data: bytes, file: str) -> Frames:
 
     Raises FileFormatError without a single frame, and for stamps that count from frame to frame.
     """
-    stamps: list[float] = []
-    identifiers: list[int] = []
-    extended: list[bool] = []
-    payloads: list[bytes] = []
-    buses: list[str] = []
+    rows: list[FrameRow] = []
     for match in _LINE.finditer(data):
         stamp, bus, identifier, count, spaced, packed = match.groups()
         digits = _drop_flags(packed) if spaced is None else spaced
@@ -61,27 +57,18 @@ def read_candump(data: bytes, file: str) -> Frames:
         wrong = count is not None and int(count) != len(payload)
         if time is None or len(payload) > LONGEST or wrong:
             continue
-        stamps.append(time)
-        identifiers.append(int(identifier, 16))
-        extended.append(len(identifier) == 8)
-        payloads.append(payload)
-        buses.append(bus.decode())
-    if not stamps:
+        rows.append((time, int(identifier, 16), len(identifier) == 8, payload, bus.decode()))
+    if not rows:
         bare = any(_BARE.match(line) for line in data[:8192].splitlines())
         what = "its lines have no time stamps" if bare else "no frame can be read"
         raise FileFormatError(what, _RECORD, Where(file=file))
-    backward = np.count_nonzero(np.diff(stamps) < 0.0)
-    if len(stamps) >= _ENOUGH and backward > _BACKWARD * len(stamps):
+    backward = np.count_nonzero(np.diff([row[0] for row in rows]) < 0.0)
+    if len(rows) >= _ENOUGH and backward > _BACKWARD * len(rows):
         what = "its time stamps run back again and again: they count from frame to frame"
         raise FileFormatError(what, _RECORD, Where(file=file))
     other = len(_OTHER.findall(data))
-    damaged = sum(1 for line in data.splitlines() if line.strip()) - len(stamps) - other
-    warnings = []
-    if other:
-        warnings.append(f"{other} remote or error frames left out")
-    if damaged:
-        warnings.append(f"{damaged} damaged lines left out of {len(stamps) + damaged + other}")
-    return build_frames(stamps, identifiers, extended, payloads, buses, tuple(warnings))
+    lines = sum(1 for line in data.splitlines() if line.strip())
+    return collect_frames(rows, file, lines=lines, other=other)
 
 
 def _parse_seconds(stamp: bytes) -> float | None:

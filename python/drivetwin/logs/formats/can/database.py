@@ -21,7 +21,7 @@ from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
 from drivetwin.logs.formats.cell_text import select_numbers
-from drivetwin.logs.formats.frames import Message, Signal
+from drivetwin.logs.formats.frames import EXTENDED_BIT, Message, Signal
 
 Bytes = NDArray[np.uint8]
 _MOST_BITS = 56
@@ -170,8 +170,6 @@ _SIGNAL = re.compile(
     r'"(?P<unit>[^"]*)"'
 )
 _NUMBER = re.compile(r'^BA_ "SPN" SG_ (?P<identifier>\d+) (?P<name>\w+) (?P<spn>\d+);')
-_EXTENDED = 1 << 31
-"""Bit of a DBC identifier that marks 29 bits."""
 
 
 @cache
@@ -193,7 +191,7 @@ def load_driveline_messages() -> tuple[Message, ...]:
     return tuple(
         Message(
             name=names[one],
-            identifier=int(one) & ~_EXTENDED,
+            identifier=int(one) & ~EXTENDED_BIT,
             extended=True,
             j1939=True,
             signals=tuple(

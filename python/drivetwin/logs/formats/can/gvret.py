@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import re
 
-from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames
+from drivetwin.logs.formats.frames import LARGEST_IDENTIFIER, LONGEST, Frames, collect_frames
 
 _HEAD = re.compile(
     rb"^(?:\xef\xbb\xbf)?Time Stamp,ID,Extended,(?P<way>Dir,)?Bus,LEN,D1\b[^\r\n]*", re.IGNORECASE
@@ -20,9 +19,6 @@ _ROW = (
 )
 _FLAGS = re.MULTILINE | re.IGNORECASE
 _ROWS = {True: re.compile(_ROW % rb"[RT]x,", _FLAGS), False: re.compile(_ROW % b"", _FLAGS)}
-
-_MOST = {False: 0x7FF, True: 0x1FFFFFFF}
-"""Largest identifier of a standard and of an extended frame."""
 
 
 def is_gvret(head: bytes) -> bool:
@@ -43,14 +39,11 @@ def read_gvret(data: bytes, file: str) -> Frames:
         cells = [cell for cell in part["data"].split(b",") if cell]
         payload = bytes(int(cell, 16) for cell in cells[: int(part["count"])])
         identifier, extended = int(part["id"], 16), part["long"].lower() in (b"true", b"1")
-        if len(payload) == int(part["count"]) <= LONGEST and identifier <= _MOST[extended]:
+        if (
+            len(payload) == int(part["count"]) <= LONGEST
+            and identifier <= LARGEST_IDENTIFIER[extended]
+        ):
             bus = f"channel {int(part['bus'])}"
             rows.append((1e-6 * int(part["time"]), identifier, extended, payload, bus))
-    if not rows:
-        raise FileFormatError("no frame in the file", "record it again", Where(file=file))
-    total = sum(1 for line in data[head.end() :].splitlines() if line.strip())
-    warnings = []
-    if damaged := total - len(rows):
-        warnings.append(f"{damaged} damaged lines left out of {total}")
-    stamps, identifiers, extended_of, payloads, buses = zip(*rows, strict=True)
-    return build_frames(stamps, identifiers, extended_of, payloads, buses, tuple(warnings))
+    lines = sum(1 for line in data[head.end() :].splitlines() if line.strip())
+    return collect_frames(rows, file, lines=lines)

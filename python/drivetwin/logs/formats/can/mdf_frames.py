@@ -8,14 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.logs.formats.frames import FD_LENGTHS, PAYLOAD, Frames
+from drivetwin.logs.formats.frames import (
+    EXTENDED_BIT,
+    FD_LENGTHS,
+    LARGEST_IDENTIFIER,
+    PAYLOAD,
+    Frames,
+)
 from drivetwin.logs.raw import subtract_origin
 
 DATA_FRAME = "CAN_DataFrame"
 """Name of the record of a data frame; its parts follow after a dot."""
 
 _RECORDS = frozenset(f"CAN_{kind}Frame" for kind in ("Data", "Remote", "Error", "Overload"))
-_EXTENDED, _NUMBER = 0x80000000, 0x1FFFFFFF
 _LENGTHS = np.array(FD_LENGTHS, np.uint8)
 
 
@@ -93,8 +98,8 @@ def _read_group_frames(mdf: Any, number: int) -> Frames | None:
     used, place = np.unique(channel, return_inverse=True)
     return Frames(
         time=time,
-        identifier=(raw & _NUMBER).astype(np.uint32),
-        extended=np.asarray((raw & _EXTENDED) != 0 if ide is None else ide != 0),
+        identifier=(raw & LARGEST_IDENTIFIER[True]).astype(np.uint32),
+        extended=np.asarray((raw & EXTENDED_BIT) != 0 if ide is None else ide != 0),
         data=filled,
         length=length,
         bus=place.astype(np.intp),

@@ -10,7 +10,13 @@ from __future__ import annotations
 import re
 
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import FD_LENGTHS, LONGEST, Frames, build_frames
+from drivetwin.logs.formats.frames import (
+    FD_LENGTHS,
+    LARGEST_IDENTIFIER,
+    LONGEST,
+    Frames,
+    collect_frames,
+)
 
 _BOM = b"\xef\xbb\xbf"
 _HEAD = re.compile(rb"^\s*;\$FILEVERSION\s*=", re.IGNORECASE)
@@ -47,9 +53,6 @@ _PATTERNS = {
 }
 """Pattern of each column of version 2 that is read; others hold one word."""
 
-_MOST = {False: 0x7FF, True: 0x1FFFFFFF}
-"""Largest identifier of a standard and of an extended frame."""
-
 
 def is_trc(head: bytes) -> bool:
     """Return True if the first bytes of a file are a trace; version 1.0 does not state its name."""
@@ -74,20 +77,12 @@ def read_trc(data: bytes, file: str) -> Frames:
         code, stated_length = int(part.get("code") or 0), part.get("length")
         length = FD_LENGTHS[min(code, 15)] if stated_length is None else int(stated_length)
         identifier, extended = int(part["id"], 16), len(part["id"]) > 4
-        if len(payload) == length <= LONGEST and identifier <= _MOST[extended]:
+        if len(payload) == length <= LONGEST and identifier <= LARGEST_IDENTIFIER[extended]:
             time = float(part["time"].replace(b",", b".")) * 1e-3
             bus = f"channel {int(part.get('bus') or 1) - 1}"
             rows.append((time, identifier, extended, payload, bus))
-    if not rows:
-        raise FileFormatError("no frame in the file", "record it again", Where(file=file))
-    total, left_out = len(_LINE.findall(data)), len(other.findall(data))
-    warnings = []
-    if left_out:
-        warnings.append(f"{left_out} remote or error frames left out")
-    if damaged := total - left_out - len(rows):
-        warnings.append(f"{damaged} damaged lines left out of {total}")
-    stamps, identifiers, extended_of, payloads, buses = zip(*rows, strict=True)
-    return build_frames(stamps, identifiers, extended_of, payloads, buses, tuple(warnings))
+    lines, left_out = len(_LINE.findall(data)), len(other.findall(data))
+    return collect_frames(rows, file, lines=lines, other=left_out)
 
 
 def _split_columns(stated: bytes) -> list[bytes]:

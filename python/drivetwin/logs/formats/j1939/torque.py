@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin.channels.shiftlog import Channel, FloatArray, Quantity
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.logs.raw import RawChannel
 
 REFERENCE = 544
