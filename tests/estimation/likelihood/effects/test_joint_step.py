@@ -13,8 +13,10 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.effects.joint_step import (
     SIZES,
+    JointStep,
     WeightedColumns,
     compute_evidence,
+    compute_size_spread,
     scale_by_evidence,
 )
 from drivetwin.estimation.result.cause import Group
@@ -81,7 +83,9 @@ def test_an_effect_that_acts_has_most_evidence() -> None:
 def test_sizes_are_those_of_greatest_evidence() -> None:
     made = Dense(1, np.array([9.0, -9.0, 0.0, 0.0, 0.0]))
     sums = replace(made.sums, weighted=(made.Z,))
-    scale = scale_by_evidence(sums, made.information, 1.0).columns.scale
+    scaled, sizes = scale_by_evidence(sums, made.information, 1.0)
+    scale = scaled.columns.scale
+    assert np.exp([sizes[DRAG], sizes[DRIFT]]) == pytest.approx(scale[[0, 2]])
     assert scale[0] == scale[1] > 1.5
     assert scale[2] == scale[3] < 1.0
     assert scale[4] == 1.0
@@ -100,3 +104,40 @@ def test_sizes_are_those_of_greatest_evidence() -> None:
             other = scale.copy()
             other[group] *= factor
             assert compute_posterior(other) < best
+
+
+def test_estimates_vary_with_the_sizes_by_their_posterior() -> None:
+    """Each size is another model; all are solved and their evidence is computed densely."""
+    made = Dense(2, np.array([2.0, -1.0, 0.0, 0.0, 0.0]))
+
+    def solve(log: float) -> tuple[FloatArray, FloatArray, float]:
+        """Return unknowns and amounts in the stated size, M⁻¹, and the log posterior of a size."""
+        scale = np.where([one == DRAG for one in made.groups], np.exp(log), 1.0)
+        Z = made.Z * scale
+        cross = made.J.T @ Z
+        inverse = np.linalg.inv(
+            np.block([[made.information, cross], [cross.T, Z.T @ Z + np.eye(5)]])
+        )
+        answer = inverse @ np.concatenate([made.J.T @ made.y, Z.T @ made.y])
+        answer[3:] *= scale
+        noise = np.eye(60) + Z @ Z.T + made.J @ np.linalg.inv(made.prior) @ made.J.T
+        nats = multivariate_normal(np.zeros(60), noise).logpdf(made.y)
+        return answer, inverse, float(nats) - 0.5 * (log / SIZES.spread) ** 2
+
+    found = [solve(one) for one in np.linspace(-SIZES.farthest, SIZES.farthest, SIZES.nodes)]
+    weights = np.exp([nats - max(one[2] for one in found) for _, _, nats in found])
+    weights /= weights.sum()
+    apart = np.array([answer for answer, _, _ in found])
+    apart -= weights @ apart
+    expected = (weights * apart.T) @ apart
+
+    for size in (0.0, 0.7):
+        answer, inverse, _ = solve(size)
+        scale = np.where([one == DRAG for one in made.groups], np.exp(size), 1.0)
+        columns = made.sums.columns
+        amounts = answer[3:] / scale
+        step = JointStep(columns, answer[:3], amounts, inverse, np.zeros((8, 8)), 1.0, (), {})
+        stated = np.append(np.ones(3), scale)
+        spread = compute_size_spread(step, {DRAG: size}) * np.outer(stated, stated)
+        np.testing.assert_allclose(spread, expected, rtol=1e-8, atol=1e-12)
+        assert spread[0, 0] > 0.0

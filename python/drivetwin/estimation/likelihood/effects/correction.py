@@ -21,6 +21,7 @@ from drivetwin.estimation.likelihood.effects.joint_step import (
     GroupEvidence,
     JointStep,
     WeightedColumns,
+    compute_size_spread,
     take_joint_step,
     weight_columns,
 )
@@ -72,22 +73,23 @@ class Correction:
     """Fit corrected for effects.
 
     `mean` are the corrected unknowns with `covariance` (p, p) (total) and `noise` (p, p), that of
-    noise alone. `step` is the last joint step; `last` (p,) the move of the unknowns between the
-    last two steps, zero where one was enough. `evidence` is that of each group at the
-    minimum of the fit.
+    noise alone. `step` is the last joint step, `spread` (p+q, p+q) what uncertain sizes of the
+    effects add to its covariance; `last` (p,) the move of the unknowns between the last two steps,
+    zero where one was enough. `evidence` is that of each group at the minimum of the fit.
     """
 
     mean: ParameterVector
     covariance: FloatArray
     noise: FloatArray
     step: JointStep
+    spread: FloatArray
     last: FloatArray
     evidence: Mapping[Group, GroupEvidence]
 
     @property
     def joint_covariance(self) -> FloatArray:
         """Covariance (p+q, p+q) of unknowns and amounts of the effects."""
-        joint = self.step.covariance
+        joint = self.step.covariance + self.spread
         size = self.mean.values.size
         joint[:size, :size] = self.covariance
         return joint
@@ -132,7 +134,7 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
         answers.append(_Answer(end, base.spread_amounts(step, shown), std, change / std))
         moves, amounts = _extrapolate(answers[-CORRECTION.memory - 1 :])
         limit = CORRECTION.settled
-    return _conclude(fit, base, shown, last, evidence)
+    return _conclude(fit, base, shown, last, evidence, found.sizes)
 
 
 def _describe_plant(
@@ -164,7 +166,9 @@ def keep_fit(fit: LikelihoodFit) -> Correction:
         residuals=fit.normal.residuals,
         contributions={},
     )
-    return Correction(fit.mean, fit.covariance, fit.covariance, step, np.zeros(size), {})
+    return Correction(
+        fit.mean, fit.covariance, fit.covariance, step, np.zeros((size, size)), np.zeros(size), {}
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,18 +242,21 @@ def _conclude(
     shown: Collection[Group],
     last: FloatArray,
     evidence: Mapping[Group, GroupEvidence],
+    sizes: Mapping[Group, float],
 ) -> Correction:
     """Form values and covariances at the last expansion."""
     step, chosen = base.take_step(), base.take_step(shown)
     size = last.size
     rest = step.moves - chosen.moves
     extra = _compute_model_spread(fit)
+    spread = compute_size_spread(step, sizes)
     values = fit.mean.values + base.point.values - fit.point.values + chosen.moves
     return Correction(
         fit.mean.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper)),
-        step.covariance[:size, :size] + np.outer(rest, rest) + extra,
+        (step.covariance + spread)[:size, :size] + np.outer(rest, rest) + extra,
         _compute_noise(base.normal, step) + extra,
         step,
+        spread,
         last,
         evidence,
     )

@@ -26,9 +26,11 @@ from drivetwin.vehicle.effects import EffectId
 
 @dataclass(frozen=True, eq=False)
 class EffectExpansion:
-    """Columns of all effects, scaled to their likeliest sizes, and the evidence of each group."""
+    """Columns of all effects, scaled to their likeliest sizes, the logarithms of these over the
+    stated ones, and the evidence of each group."""
 
     sums: WeightedColumns
+    sizes: Mapping[Group, float]
     evidence: Mapping[Group, GroupEvidence]
 
     @property
@@ -44,7 +46,8 @@ def expand_effects(fit: LikelihoodFit, priors: EffectPriors) -> EffectExpansion 
         return None
     sums = weight_columns(fit.problem, fit.normal, columns)
     evidence = compute_evidence(sums, fit.normal.information, fit.chi2)
-    return EffectExpansion(scale_by_evidence(sums, fit.normal.information, fit.chi2), evidence)
+    scaled, sizes = scale_by_evidence(sums, fit.normal.information, fit.chi2)
+    return EffectExpansion(scaled, sizes, evidence)
 
 
 def admit_excluded(

@@ -41,6 +41,8 @@ class SizeSettings:
     hardly visible effects vanish."""
     farthest: float = 4.6
     """Largest change of that logarithm: two standard deviations."""
+    nodes: int = 15
+    """Sizes over which an effect is averaged: steps of a factor of two."""
     tolerance: float = 1e-6
     """Gradient of the log evidence by the logarithm of a size at which the search ends."""
 
@@ -160,17 +162,17 @@ def weight_columns(
 
 def scale_by_evidence(
     sums: WeightedColumns, information: FloatArray, chi2: float
-) -> WeightedColumns:
+) -> tuple[WeightedColumns, Mapping[Group, float]]:
     """Scale the columns of each group to the likeliest prior size, all groups together.
 
     The maximum of the log evidence with a normal prior on the logarithms u of the sizes. With the
     posterior means a and variances v of the amounts in prior standard deviations, its slope by u
     of a group is Σ(a² + v - 1) - u/spread² (MacKay, Neural Computation 4, 1992). Stated sensor
-    tolerances stay.
+    tolerances stay. Returns the scaled sums and u of each group that was scaled.
     """
     effects = [one for one in dict.fromkeys(sums.columns.groups) if one.effect is not None]
     if not effects:
-        return sums
+        return sums, {}
     follows = invert_information(information) @ sums.cross
     power = max(chi2, 1.0)
     own = (sums.own - sums.cross.T @ follows) / power
@@ -196,7 +198,38 @@ def scale_by_evidence(
         bounds=[(-SIZES.farthest, SIZES.farthest)] * len(effects),
         options={"gtol": SIZES.tolerance, "ftol": 0.0},
     )
-    return sums.rescale(np.exp(found.x @ members))
+    sizes = dict(zip(effects, found.x.tolist(), strict=True))
+    return sums.rescale(np.exp(found.x @ members)), sizes
+
+
+def compute_size_spread(step: JointStep, sizes: Mapping[Group, float]) -> FloatArray:
+    """Compute the covariance (p+q, p+q) of the estimates of unknowns and amounts over the sizes
+    that the effects may have.
+
+    A posterior at the likeliest sizes is too narrow: the estimates differ between sizes (Kass and
+    Steffey, JASA 84, 1989). `sizes` are the logarithms of the likeliest ones over the stated ones;
+    that of one group at a time varies by its posterior. Another size is another prior precision of
+    the amounts of the group, hence a change of rank k of M (Woodbury).
+    """
+    answer = np.concatenate([step.moves, step.amounts])
+    total = np.zeros_like(step.inverse)
+    for group, size in sizes.items():
+        own = step.moves.size + np.array(step.columns.find_columns(group), dtype=int)
+        block, pull, one = step.inverse[np.ix_(own, own)], answer[own], np.eye(own.size)
+        logs = np.linspace(-SIZES.farthest, SIZES.farthest, SIZES.nodes)
+        nats, moves = np.empty(logs.size), np.empty((logs.size, own.size))
+        for k, log in enumerate(logs):
+            tighter = np.exp(-2.0 * (log - size)) - 1.0
+            change = one + tighter * block
+            moves[k] = -tighter * np.linalg.solve(change, pull)
+            nats[k] = 0.5 * float(pull @ moves[k]) / step.chi2
+            nats[k] -= 0.5 * float(np.linalg.slogdet(change)[1]) + own.size * (log - size)
+            nats[k] -= 0.5 * (log / SIZES.spread) ** 2
+        weights = np.exp(nats - np.max(nats))
+        weights /= np.sum(weights)
+        apart = (moves - weights @ moves) @ step.inverse[own]
+        total += apart.T @ (weights[:, None] * apart)
+    return total
 
 
 def compute_evidence(

@@ -187,8 +187,8 @@ def average_modes(
     The minima of two modes may lie six standard deviations apart and one sample in twenty thousand
     decide between them; an interval about one of them would be wrong as often as that is the wrong
     one (Burnham and Anderson 2002). `problem` has signals as read. By the expansion none gets more
-    weight than the modes of the fit; those that would matter are fitted. With `effects` that the
-    log shows the expansion has them too, and nothing is fitted: a fit would lack them.
+    weight than the modes of the fit; those that would matter are fitted. With `effects` the
+    expansion has them too, and nothing is fitted: a fit would lack them.
     """
     choices = _choices(best.problem, best.point, best.normal, effects)
     choices = _fitted(problem, best, choices) if effects is None else choices.centre()

@@ -82,7 +82,8 @@ def select_model(
 ) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
     """Fit the variant that the log supports; return the decisions as findings.
 
-    Sampling modes are chosen beside the effects that the log shows, with their `priors`.
+    Sampling modes are chosen beside the effects that the log shows, with their `priors`, and
+    averaged beside all effects.
 
     Raises IdentificationError where no variant converges.
     """
@@ -122,13 +123,18 @@ def select_model(
 def _average_modes(
     problem: ShiftObjective, best: LikelihoodFit, priors: EffectPriors
 ) -> tuple[LikelihoodFit, list[Finding]]:
-    """Average over sampling modes, with the effects that the log shows as further unknowns."""
+    """Average over sampling modes, with the effects as further unknowns.
+
+    Half a sample of one signal may take the place of an effect, so that the log shows neither. The
+    fit itself changes its modes only beside effects that are shown.
+    """
     found = expand_effects(best, priors)
-    if found is None or not any(group.effect for group in found.shown):
+    if found is None:
         return average_modes(problem, best)
-    other = refit_mode_beside(problem, best, found.sums)
-    if other is not best:
-        best, found = other, expand_effects(other, priors)
+    if any(group.effect for group in found.shown):
+        other = refit_mode_beside(problem, best, found.sums)
+        if other is not best:
+            best, found = other, expand_effects(other, priors)
     return average_modes(problem, best, None if found is None else found.sums)
 
 
