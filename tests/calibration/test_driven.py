@@ -66,6 +66,12 @@ def test_a_log_has_the_calibration_that_its_pressures_follow(
     assert found.request == pytest.approx(REQUEST, abs=2e-3)
     assert found.departure is not None
     assert found.departure < 3e3
+    lower = replace(build(shift).engine_torque, values=build(shift).engine_torque.values - 100.0)
+    same = replace(build(shift), engine_torque=lower)
+    moved = match_profiles(logged, {"lower": same}, shift).profiles
+    assert moved is not None
+    demand = float(np.asarray(moved.engine_torque.values)[0])
+    assert demand == pytest.approx(POINT.engine_torque, abs=2.0)  # noise of the message
     none = match_profiles(logged, {"other": other}, shift)
     assert none.profiles is None
     assert none.departure is not None

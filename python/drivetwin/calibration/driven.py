@@ -28,6 +28,11 @@ _RAMPS = 0.02
 delays and lags of the hydraulics on the ramps, and errors of gain. Another calibration departs by
 more."""
 
+_STEADY = 0.3
+"""Time [s] before the request over which the logged torque shows the driver's demand."""
+_SAME_DEMAND = 0.01
+"""Share of the torque up to which a difference of the demands is an error of the message."""
+
 
 @dataclass(frozen=True, eq=False)
 class DrivenShift:
@@ -73,7 +78,24 @@ def match_profiles(
     if departure > np.hypot(noise, _RAMPS * largest):
         return DrivenShift(logged, departure=departure)
     moved = Profiles(*(_move(one, offset) for one in candidates[file].signals.values()))
-    return DrivenShift(logged, moved, offset + shift.request, file, departure)
+    request = offset + shift.request
+    return DrivenShift(logged, _follow_demand(moved, logged, request), request, file, departure)
+
+
+def _follow_demand(profiles: Profiles, logged: LoggedShift, request: float) -> Profiles:
+    """Move the torque to the driver's demand of the log, where it is another one.
+
+    Delay and lag do not act on the steady torque before the request.
+    """
+    torque, seen = profiles.engine_torque, prepare_signal(logged.log["engine_torque"])
+    steady = (seen.time >= request - _STEADY) & (seen.time <= request)
+    if not steady.any():
+        return profiles
+    wanted = np.interp(seen.time[steady], torque.time, torque.values)
+    more = float(np.mean(seen.values[steady] - wanted))
+    if abs(more) <= _SAME_DEMAND * float(np.max(np.abs(torque.values))):
+        return profiles
+    return replace(profiles, engine_torque=replace(torque, values=torque.values + more))
 
 
 def _move(signal: Signal, offset: float) -> Signal:

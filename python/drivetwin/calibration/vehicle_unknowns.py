@@ -296,18 +296,19 @@ def add_exact(twin: Twin, values: Mapping[str, float]) -> Twin:
 
 
 def list_added(twin: Twin, shift: Shift, *, commanded: bool) -> list[AddedUnknown]:
-    """List the unknowns of the path of the inputs.
+    """List the unknowns of the path from `commanded` profiles to the clutches; else there are none.
 
-    The lag of the engine torque is one where shifts are simulated from what was `commanded`:
-    the age of a torque message cannot be told from it.
+    The age of a torque message cannot be told from a lag of the torque, and a closed slip loop has
+    no path.
     """
+    if not commanded:
+        return []
     slope = f"{CAPACITY_SLOPE}.{shift.oncoming}"
-    found = [AddedUnknown(slope, twin.get_value(slope, 0.0), _SLOPE_STD)]
-    if commanded:
-        lag = twin.get_value(TORQUE_LAG, 0.0)
-        std = EFFECTS[EffectId.TORQUE_LAG].std
-        found.append(AddedUnknown(TORQUE_LAG, lag, std, _LEAST_LAG))
-    return found
+    lag, std = twin.get_value(TORQUE_LAG, 0.0), EFFECTS[EffectId.TORQUE_LAG].std
+    return [
+        AddedUnknown(slope, twin.get_value(slope, 0.0), _SLOPE_STD),
+        AddedUnknown(TORQUE_LAG, lag, std, _LEAST_LAG),
+    ]
 
 
 def build_unknowns(

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from drivetwin._util.display_units import spell_unit
 from drivetwin.calibration.calibrate import Calibration
-from drivetwin.calibration.learn import Correction
+from drivetwin.calibration.compared_shift import PhaseDeviation
+from drivetwin.calibration.learn import LEARN, Correction
 from drivetwin.calibration.metrics import Metric
+from drivetwin.channels.roles import get_quantity
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.report.blocks import Block, TableBlock, Tile, TilesBlock, Tone, make_table
 
@@ -19,7 +21,7 @@ def build_correction_blocks(found: Correction, next_one: Calibration) -> list[Bl
 
     `next_one` is the calibration on the corrected twin, whose start is an earlier one.
     """
-    return [_build_gain(next_one), _build_fit(found), _build_values(found)]
+    return [_build_gain(next_one), _build_fit(found), _build_phases(found), _build_values(found)]
 
 
 def _build_gain(found: Calibration) -> TilesBlock:
@@ -40,6 +42,26 @@ def _build_fit(found: Correction) -> TableBlock:
     return make_table(
         "Logged shifts: RMS deviation of the simulation",
         ("signal", "unit", ("before", ".3g"), ("after", ".3g")),
+        rows,
+    )
+
+
+def _build_phases(found: Correction) -> TableBlock:
+    """Largest deviation of each signal and phase over the shifts."""
+    worst: dict[tuple[str, str], PhaseDeviation] = {}
+    for one in found.phases:
+        key = one.role, one.phase
+        if key not in worst or one.ratio > worst[key].ratio:
+            worst[key] = one
+    rows = [
+        (one.role, one.phase, get_quantity(one.role).unit, one.rms, one.expected, one.ratio)
+        for one in worst.values()
+    ]
+    numbers = (("deviation", ".3g"), ("expected", ".3g"), ("ratio", ".2f"))
+    return make_table(
+        "Largest RMS deviation of the corrected twin by phase; a ratio above "
+        f"{LEARN.misfit:g} is refused",
+        ("signal", "phase", "unit", *numbers),
         rows,
     )
 
