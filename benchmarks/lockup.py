@@ -25,6 +25,7 @@ from drivetwin.actuator.lockup import (
     IdentifiedLockup,
     LockupClutch,
     SlipRecord,
+    check_lockup,
     identify_lockup,
     simulate_slip,
 )
@@ -114,13 +115,16 @@ def main() -> int:
         sys.stdout.write(f"skipped: {folder} does not hold {' and '.join(_EVENTS)}\n")
         return 0
     events = [read_event(folder / name) for name in _EVENTS]
+    alone = {}
     for name, fitted, other in zip(_EVENTS, events, events[::-1], strict=True):
-        found = identify_lockup([fitted])
+        found = alone[name] = identify_lockup([fitted])
         sys.stdout.write(f"fitted to {name}: {format_clutch(found)}")
         sys.stdout.write("| fit | error, rpm | error of the other event, rpm | break-away, ms |\n")
         sys.stdout.write("|---|---|---|---|\n")
         sys.stdout.write(format_row("identified", found.clutch, fitted, other))
         sys.stdout.write(format_row("published", fit_published(fitted), fitted, other))
+    for one in check_lockup(alone):
+        sys.stdout.write(f"{one.text}\n")
     return 0
 
 

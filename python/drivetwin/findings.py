@@ -26,6 +26,8 @@ class Code(StrEnum):
     """Kind of a finding, the key of its entry in the catalogue."""
 
     RECORDING = auto()
+    LOCKUP_MISFIT = auto()
+    LOCKUP_DISAGREES = auto()
     COLUMN_AMBIGUOUS = auto()
     NO_PRESSURE = auto()
     OTHER_SENDERS = auto()

@@ -8,9 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.actuator.lockup import LockupClutch, SlipRecord, identify_lockup, simulate_slip
+from drivetwin.actuator.lockup import (
+    IdentifiedLockup,
+    LockupClutch,
+    SlipRecord,
+    check_lockup,
+    estimate_slip_noise,
+    identify_lockup,
+    simulate_slip,
+)
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.errors import IdentificationError
+from drivetwin.findings import Code
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Start, build_element, simulate
 
@@ -81,3 +90,47 @@ def test_break_away_and_grip_are_those_of_a_clutch_in_the_core() -> None:
     assert own == ["break_away", "lock"]
     one_step = 2e-3 * np.abs(np.diff(slip)).max() / 0.02  # of the fastest motion: first order
     assert np.abs(simulate_slip(CLUTCH, record) - slip).max() < one_step
+
+
+USUAL = LockupClutch(
+    ActuatorModel(0.05, 0.05, 0.06, kiss_pressure=6.5e4), 2e-3, 1.2, inertia=0.25, fluid=5.0
+)
+"""A clutch within the usual ranges."""
+
+
+def make_release(seed: int, *, judder: float = 0.0) -> SlipRecord:
+    """Release and close a usual clutch; its slip swings by the share `judder` at 6 Hz."""
+    random = np.random.default_rng(seed)
+    command = HeldSignal(np.array([0.0, 0.2, 0.7]), np.array([1.2e5, 8.5e4, 1.6e5]))
+    record = replace(make_record(0.0, 0.0), command=command)
+    slip = simulate_slip(USUAL, record)
+    swung = slip * (1.0 + judder * np.sin(2.0 * np.pi * 6.0 * TIME))
+    return replace(record, slip=swung + random.normal(0.0, record.noise, slip.size))
+
+
+def test_the_noise_of_a_slip_is_found_beside_its_motion() -> None:
+    found = [estimate_slip_noise(make_release(seed).slip) for seed in range(40)]
+    assert np.mean(found) == pytest.approx(0.5, rel=0.15)
+
+
+@pytest.fixture(scope="module")
+def true_events() -> dict[str, IdentifiedLockup]:
+    return {f"event {seed}": identify_lockup([make_release(seed)]) for seed in (1, 2)}
+
+
+def test_events_of_the_model_have_no_finding(true_events: dict[str, IdentifiedLockup]) -> None:
+    assert check_lockup(true_events) == []
+
+
+def test_slip_that_the_model_lacks_is_a_misfit() -> None:
+    found = identify_lockup([make_release(1, judder=0.3)])
+    codes = [one.code for one in check_lockup({"judder": found})]
+    assert codes == [Code.LOCKUP_MISFIT]
+
+
+def test_events_that_disagree_are_named(true_events: dict[str, IdentifiedLockup]) -> None:
+    first, second = true_events.values()
+    other = replace(second, clutch=replace(second.clutch, inertia=first.clutch.inertia + 1.0))
+    (found,) = check_lockup({"a": first, "b": other})
+    assert found.code is Code.LOCKUP_DISAGREES
+    assert "a and b disagree in the inertia" in found.text

@@ -13,17 +13,21 @@ is minimised. As no pressure is measured, the gain of the valve is contained in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
-from scipy.optimize import Bounds, differential_evolution
+from scipy.optimize import Bounds, differential_evolution, minimize
+from scipy.stats import norm
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import spell_unit
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
 from drivetwin.actuator.search import Prior, Unknowns, sample_posterior
 from drivetwin.errors import IdentificationError
+from drivetwin.findings import Code, Finding, Number, report
 
 _STEP = 2e-3
 """Step [s] of the simulation."""
@@ -31,6 +35,8 @@ _KISS, _KISS_STD = 0.7, 0.2
 """Mean and standard deviation of the kiss pressure over the least command."""
 _REACH, _GENERATIONS = 3.0, 60
 """Range of the search over the priors' standard deviations, and its length."""
+_SIMPLEXES, _SIMPLEX_RUNS, _SIMPLEX = 3, 2500, 0.05
+"""Simplexes after the search, runs of each, and their size over the range."""
 
 
 _USUAL = {
@@ -43,6 +49,13 @@ _USUAL = {
 }
 _PEAK, _INERTIA, _FLUID = Prior(1.2, 0.1), Prior(0.25, 0.1), Prior(5.0, 5.0)
 """Usual ranges of lock-up clutches, SI."""
+_OWN_NAMES = ("kinetic friction per pressure", "static over kinetic friction", "inertia", "fluid")
+_OWN_UNITS = ("N*m/Pa", "1", "kg*m^2", "N*m*s/rad")
+"""Names and units of the clutch's own values."""
+_WORST_ERROR = 1.5
+"""Residuals over the noise from which the model does not fit, as for logs of calibrated shifts."""
+_CHANCE = 0.01
+"""Probability of a disagreement by chance."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +89,23 @@ class SlipRecord:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedLockup:
-    """Clutch, standard deviations (4,) of its own values, and its actuator with intervals."""
+    """Clutch, standard deviations (4,) of its own values, and its actuator with intervals.
+
+    `error` is the root mean square of the slip's residuals, `noise` that of the slip itself, as
+    `estimate_slip_noise` finds it [rad/s].
+    """
 
     clutch: LockupClutch
     std: FloatArray
     actuator: IdentifiedActuator
+    error: float
+    noise: float
+
+    @property
+    def values(self) -> FloatArray:
+        """Own values (4,) of the clutch, in the order of `std`."""
+        own = self.clutch
+        return np.array([own.kinetic, own.peak, own.inertia, own.fluid])
 
 
 def simulate_slip(clutch: LockupClutch, record: SlipRecord) -> FloatArray:
@@ -129,11 +154,57 @@ def identify_lockup(records: Sequence[SlipRecord]) -> IdentifiedLockup:
     part = replace(fit, values=best[:count], covariance=fit.covariance[:count, :count])
     actuator = replace(IdentifiedActuator.from_fit(part, best[4]), source=ActuatorSource.TORQUE)
     std = np.sqrt(np.diag(fit.covariance))[count:]
-    return IdentifiedLockup(build_clutch(best), std, actuator)
+    clutch = build_clutch(best)
+    left = np.concatenate([simulate_slip(clutch, one) - one.slip for one in records])
+    noise = max(estimate_slip_noise(one.slip) for one in records)
+    return IdentifiedLockup(clutch, std, actuator, float(np.sqrt(np.mean(left**2))), noise)
+
+
+def estimate_slip_noise(slip: FloatArray) -> float:
+    """Estimate the noise [rad/s] of a slip (n,) from its second differences.
+
+    The motion hardly bends between three samples; the median leaves out break-away and grip. White
+    noise of standard deviation s has second differences of √6·s.
+    """
+    return float(np.median(np.abs(np.diff(slip, 2))) / (norm.ppf(0.75) * np.sqrt(6.0)))
+
+
+def check_lockup(found: Mapping[str, IdentifiedLockup]) -> list[Finding]:
+    """Return findings where the model does not fit: events by name, each identified alone.
+
+    Within an event the residuals must be those of the noise; between two events the values of the
+    clutch must agree. A value is not identified where one of them speaks against the model.
+    """
+    findings = []
+    for name, one in found.items():
+        if one.error > _WORST_ERROR * one.noise:
+            sizes = {"error": Number(one.error, "rad/s"), "noise": Number(one.noise, "rad/s")}
+            ratio = Number(one.error / one.noise, "1")
+            findings.append(report(Code.LOCKUP_MISFIT, name, factor=ratio, **sizes))
+    for (first, a), (second, b) in combinations(found.items(), 2):
+        apart = (a.values - b.values) / np.sqrt(a.std**2 + b.std**2)
+        worst = int(np.argmax(np.abs(apart)))
+        if abs(apart[worst]) > norm.ppf(1.0 - 0.5 * _CHANCE / apart.size):
+            numbers = {
+                "value": Number(float(a.values[worst]), _OWN_UNITS[worst]),
+                "other": Number(float(b.values[worst]), _OWN_UNITS[worst]),
+                "deviations": Number(float(abs(apart[worst])), "1"),
+            }
+            names = {
+                "quantity": _OWN_NAMES[worst],
+                "second": second,
+                "unit": spell_unit(_OWN_UNITS[worst]),
+            }
+            findings.append(report(Code.LOCKUP_DISAGREES, first, **names, **numbers))
+    return findings
 
 
 def _search(residuals: _Residuals) -> FloatArray:
-    """Minimise residuals and deviations from the priors; break-away makes local minima."""
+    """Minimise residuals and deviations from the priors; break-away makes local minima.
+
+    Differential evolution finds the neighbourhood. Simplexes end at the minimum, since the instants
+    of break-away and grip are multiples of a step: the cost has no derivative.
+    """
     known = residuals.unknowns
 
     def evaluate(values: FloatArray) -> float:
@@ -146,7 +217,27 @@ def _search(residuals: _Residuals) -> FloatArray:
     found = differential_evolution(
         evaluate, bounds, maxiter=_GENERATIONS, popsize=8, rng=1, polish=False
     )
-    return np.asarray(found.x, dtype=np.float64)
+    size = high - low
+    best: FloatArray = (np.asarray(found.x, dtype=np.float64) - low) / size
+
+    def evaluate_share(share: FloatArray) -> float:
+        return evaluate(low + size * np.clip(share, 0.0, 1.0))
+
+    for _ in range(_SIMPLEXES):
+        simplex = best + _SIMPLEX * np.eye(best.size + 1, best.size, -1)
+        ended = minimize(
+            evaluate_share,
+            best,
+            method="Nelder-Mead",
+            options={
+                "adaptive": True,
+                "initial_simplex": simplex,
+                "maxfev": _SIMPLEX_RUNS,
+                "fatol": 1e-3,
+            },
+        )
+        best = np.clip(np.asarray(ended.x, dtype=np.float64), 0.0, 1.0)
+    return np.asarray(low + size * best)
 
 
 def build_clutch(values: FloatArray) -> LockupClutch:
