@@ -23,6 +23,7 @@ from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.knots import KnotPolicy, KnotProfile, join_profiles
 from drivetwin.calibration.policies.slip import build_slip_policy
@@ -99,6 +100,14 @@ def make_task(settings: CalibrationSettings, seed: int) -> Task:
     maneuver = make_maneuver()
     limits = list_limits(PolicyKind.KNOTS)
     return Task(maneuver, make_policy(), make_draw(maneuver), limits, seed, settings)
+
+
+def make_controller_task(settings: CalibrationSettings, seed: int) -> Task:
+    """Return the problem of the controller's parameters."""
+    maneuver = make_maneuver()
+    policy = build_controller_policy(maneuver, 10.0 * BAR)
+    limits = list_limits(PolicyKind.KNOTS)
+    return Task(maneuver, policy, make_draw(maneuver), limits, seed, settings)
 
 
 def make_slip_task(settings: CalibrationSettings, seed: int) -> Task:
