@@ -9,9 +9,8 @@ Prints one row per optimiser, over 4,000 fresh draws that none of them has seen,
 stated bounds hold: 95 % of the lock-ups by 1.15 s, mean friction energy at most 46 kJ, peak jerk
 below 20 Hz and vibration dose no larger than of the hand tuning, at most 60 s of CPU time with all
 starts. Peak jerk with knots or the controller's parameters: 95 % at most 50 m/s^3, 99 % at most
-60. With
-the closed slip loop behind actuators: 95 % at most 32 and 99.5 % at most 45, and no unit locks
-twice. Without --policy both run.
+60. With the closed slip loop behind actuators: 95 % at most 32 and 99.5 % at most 45, and no unit
+locks twice. Without --policy all run.
 """
 
 from __future__ import annotations
