@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Calibration of the stated shift by several optimisers at equal CPU time.
 
-    python -m benchmarks.calibrate [SEED] [--policy knots|controller|slip] [--alone] [--against NAME]
+    python -m benchmarks.calibrate [SEED] [--policy NAME] [--alone] [--against NAME]
 
 Optuna takes part where it is installed; it is no dependency of the project.
 
