@@ -113,6 +113,10 @@ _SPECS = (
         "first-order lag of the acting engine torque behind the commanded one", 0.0, 1.0,
     ),
     ParameterSpec(
+        "te_shift", "engine torque shift", "τ_s", "s",
+        "delay of the acting engine torque behind the commanded one, beside its lag", -1.0, 1.0,
+    ),
+    ParameterSpec(
         "capacity_slope", "friction over pressure", "a_p", "1",
         "relative change of the friction coefficient from P0 to the reference pressure above it",
         -1.0, 1.0, "element",

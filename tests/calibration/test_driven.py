@@ -22,12 +22,22 @@ from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal
-from drivetwin.twin.twin import CAPACITY_SLOPE, TORQUE_LAG, Twin, build_nominal_shift
+from drivetwin.twin.twin import (
+    CAPACITY_SLOPE,
+    PRESSURE_DELAY,
+    TORQUE_LAG,
+    TORQUE_SHIFT,
+    Twin,
+    build_nominal_shift,
+)
 from drivetwin.validation.simulate_log import LoggedShift
 from tests.calibration.bench import write_bench_log
 from tests.calibration.cases import SYSTEM
 from tests.calibration.twins import make_twin
 
+TOGETHER = 1.2e-3
+"""Standard deviation of the lag of the torque with a known delay [s]: ramps of 0.1 s show their sum
+better than either."""
 REQUEST, POINT = 1.5, OperatingPoint(1400.0, 175.0)
 """Request in the logs of the bench [s], and its operating point."""
 
@@ -87,16 +97,32 @@ def test_a_lag_of_the_torque_and_a_slope_of_the_capacity_are_found(
     driven = DrivenShift(read(twin, tmp_path / "bench.csv"), profiles, REQUEST)
     found = correct_twin(twin, [driven], Spread())
     require_explained(found)
-    for one in found.values:
-        if one.id == TORQUE_LAG:
-            assert abs(one.after - lag) < 3.0 * one.after_std
-            assert one.after_std < 0.1 * lag
-        if one.id == f"{CAPACITY_SLOPE}.B3":
-            assert one.after > 3.0 * one.after_std
+    by_id = {one.id: one for one in found.values}
+    late, rise = by_id[TORQUE_LAG], by_id[f"{CAPACITY_SLOPE}.B3"]
+    assert abs(late.after - lag) < 3.0 * late.after_std
+    assert rise.after > 3.0 * rise.after_std
     path = InputPath.from_twin(found.twin)
-    assert path.torque_lag > 0.5 * lag
+    assert path.torque_lag + path.torque_shift == pytest.approx(lag, abs=3.0 * TOGETHER)
     assert path.slopes.keys() == {"B3"}
     assert get_parameter_spec(TORQUE_LAG).unit == "s"
+
+
+def test_a_request_that_pressures_date_late_moves_both_inputs(
+    twin: Twin, model: DualClutch, tmp_path: Path
+) -> None:
+    """A bus shows the pressures late: so late is the request by which the torque is commanded."""
+    late = 0.008
+    given = write_bench_log(tmp_path / "bench.csv", model)
+    moved = Profiles(*(replace(one, time=one.time + late) for one in given.signals.values()))
+    driven = DrivenShift(read(twin, tmp_path / "bench.csv"), moved, REQUEST + late)
+    found = correct_twin(twin, [driven], Spread())
+    require_explained(found)
+    by_id = {one.id: one for one in found.values}
+    delay = by_id[PRESSURE_DELAY]
+    assert abs(delay.after + late) < 3.0 * delay.after_std
+    assert delay.after_std < 0.1 * late
+    torque = by_id[TORQUE_SHIFT].after + by_id[TORQUE_LAG].after
+    assert torque == pytest.approx(-late, abs=3.0 * TOGETHER)
 
 
 def test_logs_of_another_vehicle_are_refused_with_signal_and_phase(
@@ -123,7 +149,7 @@ def test_the_path_delays_lags_and_scales_inputs() -> None:
     twin = make_twin()
     elements = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3"))).elements
     contact = elements[1].P0
-    path = InputPath(0.01, 0.02, {"B3": CapacitySlope(0.1, 2e5)})
+    path = InputPath(0.01, 0.02, 0.0, {"B3": CapacitySlope(0.1, 2e5)})
     found = path.apply(step, {"B2": ramp, "B3": ramp}, elements, time)
     late = np.interp(time - 0.01, ramp.time, ramp.values)
     np.testing.assert_allclose(found["B2"].values, late)

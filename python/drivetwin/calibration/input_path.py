@@ -11,7 +11,14 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import apply_lag
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, ShiftElement, Signal
-from drivetwin.twin.twin import CAPACITY_REFERENCE, CAPACITY_SLOPE, PRESSURE_DELAY, TORQUE_LAG, Twin
+from drivetwin.twin.twin import (
+    CAPACITY_REFERENCE,
+    CAPACITY_SLOPE,
+    PRESSURE_DELAY,
+    TORQUE_LAG,
+    TORQUE_SHIFT,
+    Twin,
+)
 
 _SHORTEST_LAG = 1e-6
 """Lag [s] below which there is none: far below every sampling step."""
@@ -40,13 +47,14 @@ class CapacitySlope:
 
 @dataclass(frozen=True)
 class InputPath:
-    """Delay of the pressures [s], lag of the engine torque [s], and capacity by shift element.
+    """Delays of pressures and engine torque [s], lag of the latter [s], capacity by shift element.
 
     A path of the inputs leaves the simulation itself as it is.
     """
 
     pressure_delay: float = 0.0
     torque_lag: float = 0.0
+    torque_shift: float = 0.0
     slopes: Mapping[str, CapacitySlope] = field(default_factory=dict)
 
     @classmethod
@@ -58,8 +66,9 @@ class InputPath:
             reference = twin.get_value(f"{CAPACITY_REFERENCE}.{name}", 0.0)
             if slope != 0.0 and reference > 0.0:
                 slopes[name] = CapacitySlope(slope, reference)
-        delay, lag = (twin.get_value(name, 0.0) for name in (PRESSURE_DELAY, TORQUE_LAG))
-        return cls(delay, lag, slopes)
+        names = (PRESSURE_DELAY, TORQUE_LAG, TORQUE_SHIFT)
+        delay, lag, shift = (twin.get_value(name, 0.0) for name in names)
+        return cls(delay, lag, shift, slopes)
 
     def apply(
         self,
@@ -72,7 +81,8 @@ class InputPath:
 
         `pressures` [Pa] are by the names of the `elements`.
         """
-        torque = np.interp(time, engine_torque.arrival, engine_torque.values)
+        arrival = engine_torque.arrival + self.torque_shift
+        torque = np.interp(time, arrival, engine_torque.values)
         if self.torque_lag > _SHORTEST_LAG:
             torque = apply_lag(torque, float(time[1] - time[0]), self.torque_lag)
         found = {ENGINE_TORQUE: Signal(time, torque)}

@@ -27,7 +27,14 @@ from drivetwin.twin.friction_law import (
     to_law,
     to_values,
 )
-from drivetwin.twin.twin import CAPACITY_SLOPE, PRESSURE_DELAY, SIMULATED, TORQUE_LAG, Twin
+from drivetwin.twin.twin import (
+    CAPACITY_SLOPE,
+    PRESSURE_DELAY,
+    SIMULATED,
+    TORQUE_LAG,
+    TORQUE_SHIFT,
+    Twin,
+)
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
 
@@ -110,6 +117,9 @@ _LEAST = 1e-12
 _UNIT_STD = {"k_o": 0.03, "c_o": 0.2, "J_prime": 0.02, "J_vehicle": 0.02, "Tv_over_if": 0.05}
 """Relative standard deviations between made units, by stem, of what `Spread` leaves out:
 engineering estimates (fuel and load of a vehicle; damping varies with oil and mounts)."""
+_SHIFT_STD = 0.005
+"""Standard deviation of the delay of the engine torque [s]: the request of a log is dated by its
+pressures, which a bus shows up to a cycle of 10 ms late."""
 _LEAST_LAG = 2e-5
 """Lag [s] that moves no signal by its noise."""
 _SLOPE_STD = 0.10
@@ -308,6 +318,7 @@ def list_added(twin: Twin, shift: Shift, *, commanded: bool) -> list[AddedUnknow
     return [
         AddedUnknown(slope, twin.get_value(slope, 0.0), _SLOPE_STD),
         AddedUnknown(TORQUE_LAG, lag, std, _LEAST_LAG),
+        AddedUnknown(TORQUE_SHIFT, twin.get_value(TORQUE_SHIFT, 0.0), _SHIFT_STD),
     ]
 
 

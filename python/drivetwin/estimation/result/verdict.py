@@ -54,6 +54,7 @@ _EXPERIMENT = {
     "te_delay": "Step the pedal in gear.",
     "p_delay": "Record a shift with faster pressure ramps.",
     "te_lag": "Record a shift with a faster torque reduction.",
+    "te_shift": "Record a shift with a faster torque reduction.",
     "capacity_slope": "Record shifts at two pressure levels.",
     "capacity_reference": "Record shifts at two pressure levels.",
     "mode_frequency": _EXCITE_ENGINE,
