@@ -26,9 +26,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.estimation.likelihood.shift_objective import ShiftTerm, compute_column_products
 from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
 from drivetwin.estimation.optimize.gauss_newton import minimise, solve_step
 

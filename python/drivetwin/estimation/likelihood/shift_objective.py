@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shifts in the likelihood: residuals, noise of the inputs, and the parts that plants may have."""
+"""Shifts in the likelihood: residuals, noise of inputs, parts of plants, products with columns."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from drivetwin.estimation.likelihood.parametrization import (
     ShiftModel,
     retract,
 )
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
@@ -359,3 +359,57 @@ class ShiftObjective(LikelihoodObjective[ShiftTerm]):
     def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
         """Compute the values (p,) after a `step` (p,); friction laws move along their valley."""
         return retract(point, step)
+
+
+@dataclass(frozen=True, eq=False)
+class ColumnProducts:
+    """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
+
+    `own` (q, q) is ZᵀΣ⁻¹Z, `cross` (p, q) JᵀΣ⁻¹Z and `pull` (q,) ZᵀΣ⁻¹r; `weighted` (n, q) is
+    Σ⁻¹Z of each part. With an amount s (q,) of the effects the residual is r - Z·s, and Q changes
+    by sᵀ·own·s - 2·pull·s before the unknowns follow.
+    """
+
+    own: FloatArray
+    cross: FloatArray
+    pull: FloatArray
+    weighted: tuple[FloatArray, ...]
+
+    def extend_expansion(
+        self, minimum: NormalEquations, precision: FloatArray, known: FloatArray | float = 0.0
+    ) -> NormalEquations:
+        """The expansion at a `minimum` with the effects as q more unknowns, behind its own.
+
+        Of these `precision` (q,) is known beforehand, about zero, from which they are `known` (q,)
+        away already.
+        """
+        information = np.block(
+            [[minimum.information, self.cross], [self.cross.T, self.own + np.diag(precision)]]
+        )
+        data = np.block([[minimum.data, self.cross], [self.cross.T, self.own]])
+        pairs = zip(minimum.regressors, self.weighted, strict=True)
+        return replace(
+            minimum,
+            gradient=np.concatenate([np.zeros(len(self.cross)), precision * known - self.pull]),
+            information=information,
+            data=data,
+            regressors=tuple(np.column_stack(both) for both in pairs),
+        )
+
+
+def compute_column_products(
+    problem: ShiftObjective, normal: NormalEquations, columns: Sequence[FloatArray]
+) -> ColumnProducts:
+    """Form the products of `columns` (n, q) of each part at the point of the expansion `normal`."""
+    size = columns[0].shape[1]
+    own, cross = np.zeros((size, size)), np.zeros((normal.gradient.size, size))
+    pull, every = np.zeros(size), []
+    for part, z, residual, regressors in zip(
+        problem.parts, columns, normal.residuals, normal.regressors, strict=True
+    ):
+        weighted = part.weighting.apply_inverse(z)
+        own += z.T @ weighted
+        cross += regressors.T @ z
+        pull += weighted.T @ residual
+        every.append(weighted)
+    return ColumnProducts(own, cross, pull, tuple(every))

@@ -12,7 +12,7 @@ from typing import Any
 from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.can.other_tools import refuse_bus_tool
+from drivetwin.logs.formats.can.texts import refuse_bus_tool
 from drivetwin.logs.formats.guarded import open_guarded
 from drivetwin.logs.raw import HEAD_BYTES, Opener, Recording
 

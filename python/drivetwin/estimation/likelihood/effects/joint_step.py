@@ -23,10 +23,9 @@ from scipy.optimize import minimize
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
-from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, compute_column_products
 from drivetwin.estimation.optimize.objective import NormalEquations
 from drivetwin.estimation.result.cause import Group
 

@@ -31,7 +31,6 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
-from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -40,7 +39,11 @@ from drivetwin.estimation.likelihood.optimize.multistart import (
     fit_local,
     fit_lower_gear_only,
 )
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
+from drivetwin.estimation.likelihood.shift_objective import (
+    ShiftObjective,
+    ShiftTerm,
+    compute_column_products,
+)
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95
