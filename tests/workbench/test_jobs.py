@@ -72,7 +72,7 @@ def test_a_typed_error_keeps_its_parts() -> None:
 
 @pytest.mark.parametrize(
     ("work", "says"),
-    [(_dying, "exit code 3"), (_greedy, "more memory"), (_broken, "ValueError: odd")],
+    [(_dying, "ended with code 3"), (_greedy, "more memory"), (_broken, "ValueError: odd")],
 )
 def test_a_process_that_dies_is_a_fault(work: object, says: str) -> None:
     with pytest.raises(InputError) as caught:

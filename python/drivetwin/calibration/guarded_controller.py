@@ -18,6 +18,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, NoReturn
 
+from drivetwin._util.child_process import describe_end
 from drivetwin._util.progress import attach_listener, notify_progress
 from drivetwin.errors import ControllerError, Where
 from drivetwin.simulation.controller_library import Call, create_trace, read_calls
@@ -112,12 +113,8 @@ def _wait(pipe: Connection, child: SpawnProcess, library: Path) -> Any:
 
 def _raise_crash(child: SpawnProcess, library: Path) -> NoReturn:
     """Name the call in progress when the child ended."""
-    code = child.exitcode
-    ended = f"exit code {code}"
-    if code is not None and code < 0:
-        ended = signal.Signals(-code).name
     calls = read_calls(library)
-    what = f"ended the program ({ended})"
+    what = f"ended the program (it {describe_end(child.exitcode)})"
     raise _make_error(what, calls[0] if calls else None, library)
 
 

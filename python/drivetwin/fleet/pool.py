@@ -10,7 +10,6 @@ import contextlib
 import json
 import os
 import select
-import signal
 import subprocess
 import sys
 import tempfile
@@ -20,6 +19,7 @@ from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import IO, Protocol
 
+from drivetwin._util.child_process import BY_ITSELF, GRACE, describe_end, end_process
 from drivetwin.fleet.task import (
     Aborted,
     Completed,
@@ -48,11 +48,8 @@ _TRIMMING = "MALLOC_TRIM_THRESHOLD_"
 """A Dask nanny sets it for the Dask worker, so that freed memory goes back to the system at once. A
 worker of ours would get the same pages back with the next array, which costs some per cent."""
 
-_GRACE = 2.0
-"""Time [s] for a worker to end that has closed its output."""
 _PAUSES = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0)
 """Time [s] to wait after each worker that was killed before it was ready."""
-_BY_ITSELF = "ended with code"
 
 
 class _GoneError(Exception):
@@ -81,7 +78,7 @@ class GuardedWorker:
             self._send(task)
             reply = self._read_line(monotonic() + limits.seconds, limits.memory)
         except _GoneError:
-            return WorkerLost(self._stop_process(_GRACE))
+            return WorkerLost(self._stop_process(GRACE))
         if isinstance(reply, Outcome):
             self._stop_process()
             return Completed(reply, limits.seconds)
@@ -123,10 +120,10 @@ class GuardedWorker:
                     return None
                 why = self._stop_process()
             except _GoneError:
-                why = self._stop_process(_GRACE)
+                why = self._stop_process(GRACE)
             except OSError as fault:
                 why = str(fault.strerror)
-            if why.startswith(_BY_ITSELF):
+            if why.startswith(BY_ITSELF):
                 break
             self._closed.wait(pause)
         return Aborted(
@@ -177,26 +174,10 @@ class GuardedWorker:
         """End the worker for good, after `grace` [s] to end by itself; how it ended."""
         process, self._process = self._process, None
         assert process is not None
-        try:
-            code = process.wait(grace)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            code = process.wait()
-        for pipe in (process.stdin, process.stdout):
-            assert pipe is not None
-            with contextlib.suppress(BrokenPipeError):
-                pipe.close()
-        last = self._read_last_stderr()
-        if code < 0:
-            return f"was killed by {signal.Signals(-code).name}{last}"
-        return f"{_BY_ITSELF} {code}{last}"
-
-    def _read_last_stderr(self) -> str:
+        code = end_process(process, grace)
         assert self._stderr is not None
-        with self._stderr as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - 2000))
-            lines = file.read().decode("utf-8", "replace").strip().splitlines()
-        return f": {lines[-1][:300]}" if lines else ""
+        with self._stderr as written:
+            return describe_end(code, written)
 
 
 def make_timeout_outcome(limits: Limits) -> Outcome:

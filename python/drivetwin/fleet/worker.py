@@ -19,7 +19,7 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any
 
-from drivetwin._util.process_limits import limit_memory
+from drivetwin._util.child_process import limit_memory
 from drivetwin._util.version import get_program_version
 from drivetwin.errors import DrivetwinError, StoreError
 from drivetwin.fleet.parts import convert_write_errors, write_part

@@ -20,6 +20,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from typing import Any
 
+from drivetwin._util.child_process import describe_end
 from drivetwin._util.progress import attach_listener
 from drivetwin.errors import DrivetwinError, InputError, Where
 
@@ -142,7 +143,7 @@ class Job:
     def _record_death(self) -> None:
         self.process.join(_PATIENCE)
         self.fault = Fault(
-            f"the process that did this stopped (exit code {self.process.exitcode})",
+            f"the process that did this {describe_end(self.process.exitcode)}",
             "the file may be damaged, or expand to more memory than is available",
         )
         self._end()

@@ -26,6 +26,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from drivetwin import errors
+from drivetwin._util.child_process import GRACE, describe_end, end_process
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DrivetwinError, ReaderFailureError, Where
@@ -63,8 +64,6 @@ def compute_parser_limits(path: Path) -> ParserLimits:
     )
 
 
-GRACE = 2.0
-"""Time [s] for the child to end after the last column."""
 _DAMAGED = "the file is damaged, or the library has a fault: record or export the log again"
 _TOO_LARGE = "if the log is only long, read a shorter one; else record or export it again"
 
@@ -163,16 +162,7 @@ class _ReaderProcess:
         return self
 
     def __exit__(self, *_: object) -> None:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
-        try:
-            self._process.wait(GRACE)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._process.stdout.close()
+        end_process(self._process)
         self._stderr.close()
 
     def ask(self, request: OpenRequest | LoadRequest) -> dict[str, Any]:
@@ -226,17 +216,9 @@ class _ReaderProcess:
         if self._late or (code is not None and code == -getattr(signal, "SIGXCPU", sys.maxsize)):
             what = f"it is not read after {self._seconds:.0f} s: the library that reads it hangs"
             raise ReaderFailureError(what, _TOO_LARGE, where) from None
-        if code is not None and code < 0:
-            ended = f"was ended by {signal.Signals(-code).name}"
-        else:
-            ended = f"ended with code {code}{self._read_last_stderr()}"
+        ended = describe_end(code, self._stderr)
         what = f"the library that reads this format crashes on the file: its process {ended}"
         raise ReaderFailureError(what, _DAMAGED, where) from None
-
-    def _read_last_stderr(self) -> str:
-        self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - 2000))
-        lines = self._stderr.read().decode("utf-8", "replace").strip().splitlines()
-        return f": {lines[-1][:300]}" if lines else ""
 
 
 def make_memory_error(path: Path, memory: int) -> ReaderFailureError:

@@ -23,10 +23,9 @@ from typing import IO, Any
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.process_limits import limit_computing_time, limit_memory
+from drivetwin._util.child_process import GRACE, limit_computing_time, limit_memory
 from drivetwin.errors import DrivetwinError
 from drivetwin.logs.formats.guarded import (
-    GRACE,
     LoadRequest,
     OpenRequest,
     format_error,

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from dash import ALL, Input, Output, State, dcc, html, no_update
+from dash import Input, Output, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.findings import render
@@ -18,8 +18,11 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import card_form
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.fields import UploadField, get_triggered_part
-from drivetwin.workbench.views.sources import build_file_buttons, format_source, get_source
+from drivetwin.workbench.views.sources import (
+    build_file_buttons,
+    format_source,
+    register_opening,
+)
 
 _CARDS = (".toml",)
 _HEAD = 64 * 2**10
@@ -56,7 +59,7 @@ def layout() -> list[Component]:
 
 def register(page: ui.Page) -> None:
     """Register opening, and the data of the open card."""
-    _register_opening(page)
+    register_opening(page, "card", "card-file", open_card)
     card_form.register(page)
 
     @page.callback(
@@ -77,33 +80,6 @@ def register(page: ui.Page) -> None:
         # Without an open card the field keeps the text that was typed while the page loaded.
         path = no_update if work.card is None else format_source(work.card)
         return content, path, options, files
-
-
-def _register_opening(page: ui.Page) -> None:
-    @page.callback(Output("card-path", "value", allow_duplicate=True), Input("card-upload", "data"))
-    def open_upload(session: Session, upload: UploadField) -> str:
-        """Open an upload at once."""
-        source = session.get_uploaded(upload.key)
-        open_card(session, source)
-        return format_source(source)
-
-    @page.callback(
-        Input("open-card", "n_clicks"),
-        State("card-path", "value"),
-        State("card-upload", "data"),
-        busy="open-card",
-    )
-    def open_path(
-        session: Session, _: object, card: str | None, upload: UploadField | None
-    ) -> None:
-        """Open the card of the field."""
-        open_card(session, get_source(session, card, upload))
-
-    @page.callback(Input({"card-file": ALL}, "n_clicks"))
-    def open_file(session: Session, clicks: list[int | None]) -> None:
-        """Open a listed card of the folder."""
-        if any(clicks):
-            open_card(session, session.get_folder_source(get_triggered_part("card-file")))
 
 
 def open_card(session: Session, source: Source) -> None:

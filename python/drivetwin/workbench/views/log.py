@@ -16,7 +16,12 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import UploadField, get_triggered_part
-from drivetwin.workbench.views.sources import build_file_buttons, format_source, get_source
+from drivetwin.workbench.views.sources import (
+    build_file_buttons,
+    format_source,
+    get_source,
+    register_opening,
+)
 
 
 def layout() -> list[Component]:
@@ -66,22 +71,7 @@ def register(page: ui.Page) -> None:
 
 
 def _register_opening(page: ui.Page) -> None:
-    @page.callback(Output("log-path", "value", allow_duplicate=True), Input("log-upload", "data"))
-    def open_upload(session: Session, upload: UploadField) -> str:
-        """Open an upload at once."""
-        source = session.get_uploaded(upload.key)
-        _open(session, source)
-        return format_source(source)
-
-    @page.callback(
-        Input("open-log", "n_clicks"),
-        State("log-path", "value"),
-        State("log-upload", "data"),
-        busy="open-log",
-    )
-    def open_path(session: Session, _: object, log: str | None, upload: UploadField | None) -> None:
-        """Open the log of the field."""
-        _open(session, get_source(session, log, upload))
+    register_opening(page, "log", "file", _open)
 
     @page.callback(
         Input("add-log", "n_clicks"),
@@ -107,12 +97,6 @@ def _register_opening(page: ui.Page) -> None:
             session.remove_log(int(index) if index.isdecimal() else -1)
             ui.notify_topic(ui.Topic.LOG)
             ui.notify("The log is removed")
-
-    @page.callback(Input({"file": ALL}, "n_clicks"))
-    def open_file(session: Session, clicks: list[int | None]) -> None:
-        """Open a listed file of the folder."""
-        if any(clicks):
-            _open(session, session.get_folder_source(get_triggered_part("file")))
 
     @page.callback(Input("open-sample", "n_clicks"), busy="open-sample")
     def open_sample(session: Session, _: object) -> None:

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from dash import html
+from collections.abc import Callable
+
+from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.fields import UploadField
+from drivetwin.workbench.views.fields import UploadField, get_triggered_part
 
 _UPLOADED = "uploaded: "
 _LISTED = 30
@@ -37,3 +39,44 @@ def build_file_buttons(key: str, kind: str, names: list[str]) -> list[Component]
     hint = [ui.make_hint(f"{more} more: type the name.")] if more > 0 else []
     title = f"{kind[0].upper()}{kind[1:]}s of the folder"
     return [html.H3(title), html.Div(buttons, className="row files"), *hint]
+
+
+def register_opening(
+    page: ui.Page, kind: str, files: str, open_source: Callable[[Session, Source], None]
+) -> None:
+    """Register the ways to open a file: its upload, its path, a button of the folder's files.
+
+    Parameters
+    ----------
+    page
+        Page of the workbench.
+    kind
+        Beginning of the ids of the fields for path and upload.
+    files
+        Key of the buttons, see `build_file_buttons`.
+    open_source
+        Function that opens the file.
+    """
+    path, upload_field, button = f"{kind}-path", f"{kind}-upload", f"open-{kind}"
+
+    @page.callback(Output(path, "value", allow_duplicate=True), Input(upload_field, "data"))
+    def open_upload(session: Session, upload: UploadField) -> str:
+        """Open an upload at once."""
+        source = session.get_uploaded(upload.key)
+        open_source(session, source)
+        return format_source(source)
+
+    @page.callback(
+        Input(button, "n_clicks"), State(path, "value"), State(upload_field, "data"), busy=button
+    )
+    def open_path(
+        session: Session, _: object, typed: str | None, upload: UploadField | None
+    ) -> None:
+        """Open the file of the field."""
+        open_source(session, get_source(session, typed, upload))
+
+    @page.callback(Input({files: ALL}, "n_clicks"))
+    def open_file(session: Session, clicks: list[int | None]) -> None:
+        """Open a listed file of the folder."""
+        if any(clicks):
+            open_source(session, session.get_folder_source(get_triggered_part(files)))
