@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -85,69 +85,53 @@ def _check_effects(document: Mapping[str, Any]) -> list[Fault]:
     ]
 
 
-def _check_gears(gears: Mapping[int, GearTable]) -> list[Fault]:
-    faults = []
+def _check_gears(gears: Mapping[int, GearTable]) -> Iterator[Fault]:
     names: set[str] = set()
     for index, gear in gears.items():
         if gear.name in names:
-            faults.append(Fault(f"gears[{index}].name", f"gear {gear.name!r} is given twice"))
+            yield Fault(f"gears[{index}].name", f"gear {gear.name!r} is given twice")
         names.add(gear.name)
         if len(gear.elements) > 1:
-            faults.append(
-                Fault(
-                    f"gears[{index}].elements",
-                    f"gear {gear.name!r} is held by {', '.join(gear.elements)}: name only the "
-                    "element that changes in the shift; the others are common to both gears",
-                )
+            yield Fault(
+                f"gears[{index}].elements",
+                f"gear {gear.name!r} is held by {', '.join(gear.elements)}: name only the "
+                "element that changes in the shift; the others are common to both gears",
             )
         lower = gears.get(index - 1)
         if lower is not None and gear.ratio.value >= lower.ratio.value:
-            faults.append(
-                Fault(
-                    f"gears[{index}].ratio",
-                    f"gears run from low to high: gear {gear.name!r} with {gear.ratio.value:g} "
-                    f"must be below gear {lower.name!r} with {lower.ratio.value:g}",
-                )
+            yield Fault(
+                f"gears[{index}].ratio",
+                f"gears run from low to high: gear {gear.name!r} with {gear.ratio.value:g} "
+                f"must be below gear {lower.name!r} with {lower.ratio.value:g}",
             )
-    return faults
 
 
-def _check_references(document: Mapping[str, Any]) -> list[Fault]:
+def _check_references(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Elements that a gear names but the card does not describe, and the reverse."""
     described = _get_tables(document, "elements")
     gears = _parse_gears(document)
-    faults = [
-        Fault(
-            f"gears[{index}].elements", f"no [elements.{name}]{suggest_spelling(name, described)}"
-        )
-        for index, gear in gears.items()
-        for name in gear.elements
-        if name not in described
-    ]
-    used = {name for gear in gears.values() for name in gear.elements}
+    named = [(f"gears[{k}].elements", name) for k, gear in gears.items() for name in gear.elements]
+    for place, name in named:
+        if name not in described:
+            yield Fault(place, f"no [elements.{name}]{suggest_spelling(name, described)}")
+    used = {name for _, name in named}
     listed = document.get("gears")
     all_sound = isinstance(listed, list) and len(listed) == len(gears)
-    if all_sound:
-        faults += [
-            Fault(f"elements.{name}", "no gear names this element; add it to a gear or remove it")
-            for name in described
-            if name not in used
-        ]
-    return faults + [
-        Fault(
-            f"{section}.pressure.{name}", f"no [elements.{name}]{suggest_spelling(name, described)}"
-        )
-        for section in ("sensors", "channels")
-        for name in _get_tables(_get_tables(document, section), "pressure")
-        if name not in described
-    ]
+    for name in described if all_sound else ():
+        if name not in used:
+            text = "no gear names this element; add it to a gear or remove it"
+            yield Fault(f"elements.{name}", text)
+    for section in ("sensors", "channels"):
+        for name in _get_tables(_get_tables(document, section), "pressure"):
+            if name not in described:
+                text = f"no [elements.{name}]{suggest_spelling(name, described)}"
+                yield Fault(f"{section}.pressure.{name}", text)
 
 
 def _check_ratios(
     gears: Mapping[int, GearTable], elements: Mapping[str, ElementTable]
-) -> list[Fault]:
+) -> Iterator[Fault]:
     """i_c·i_out must be the ratio of the element's gear; a brake cannot make 1.00."""
-    faults = []
     for gear in gears.values():
         for name in gear.elements:
             element = elements.get(name)
@@ -156,27 +140,19 @@ def _check_ratios(
             if element.i_c is None or element.i_out is None:
                 if gear.ratio.value == 1.0:
                     text = f"a brake cannot make gear {gear.name!r} with ratio 1 (i_c = i - 1 = 0)"
-                    faults.append(Fault(f"elements.{name}", text))
+                    yield Fault(f"elements.{name}", text)
                 continue
             product = element.i_c.value * element.i_out.value
             if abs(product - gear.ratio.value) > RATIO_TOLERANCE * gear.ratio.value:
-                faults.append(
-                    Fault(
-                        f"elements.{name}.i_c",
-                        f"i_c·i_out = {product:.4g}, but gear {gear.name!r} has "
-                        f"{gear.ratio.value:g}",
-                    )
-                )
-    faults += [
-        Fault(
-            f"elements.{name}",
-            "makes several gears, but has one pair i_c, i_out: describe it once for each gear "
-            "under two names, with the ratios of that gear",
-        )
-        for name in elements
-        if sum(name in gear.elements for gear in gears.values()) > 1
-    ]
-    return faults
+                text = f"i_c·i_out = {product:.4g}, but gear {gear.name!r} has {gear.ratio.value:g}"
+                yield Fault(f"elements.{name}.i_c", text)
+    for name in elements:
+        if sum(name in gear.elements for gear in gears.values()) > 1:
+            yield Fault(
+                f"elements.{name}",
+                "makes several gears, but has one pair i_c, i_out: describe it once for each gear "
+                "under two names, with the ratios of that gear",
+            )
 
 
 __all__ = [
