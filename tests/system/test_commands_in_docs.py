@@ -20,8 +20,8 @@ COMMANDS = typer.main.get_command(app)
 
 
 def command_lines() -> list[str]:
-    """Every indented line of the documents that calls the program."""
-    texts = (document.read_text(encoding="utf-8") for document in DOCUMENTS)
+    """Every indented line of the documents that calls the program, continued lines joined."""
+    texts = (re.sub(r"\\\n +", "", document.read_text(encoding="utf-8")) for document in DOCUMENTS)
     return [line for text in texts for line in re.findall(r"^ {4,}drivetwin (.*)$", text, re.M)]
 
 
