@@ -375,3 +375,37 @@ def test_what_programs_write_for_no_number_is_none(word: str, other: str) -> Non
     column = values(read(f"time [s],x [Nm]\n0,{word}\n1,{other}\n2,6\n"), "x")
     assert not np.isfinite(column[0])
     assert column[1:] == ([5.0, 6.0] if other else [6.0])
+
+
+def test_of_two_time_columns_that_of_numbers_is_taken() -> None:
+    """A data frame with an index of dates keeps the time column that it had."""
+    log = read(
+        "timestamps,x,Time\n2024-07-03 15:32:45.500-03:00,1,10.5\n"
+        "2024-07-03 15:32:45.600-03:00,2,10.6\n",
+        TimeColumn(unit="s"),
+    )
+    assert [one.name for one in log.channels] == ["x"]
+    assert np.diff(log.channels[0].time) == pytest.approx([0.1])
+    assert any("Time is used, not timestamps" in one for one in log.warnings)
+
+
+@pytest.mark.parametrize(
+    ("texts", "values"),
+    [
+        (("b'Shift in process'", "b'Shift is not in process'"), [1.0, 0.0]),
+        (("off", "on"), [0.0, 1.0]),
+        (("inactive", "active"), [0.0, 1.0]),
+        (("b'ShiftInProcess'", "b'ShiftInProcess'"), [1.0, 1.0]),
+    ],
+)
+def test_texts_of_two_states_are_a_flag(texts: tuple[str, str], values: list[float]) -> None:
+    log = read(f"time [s],flag\n0,{texts[0]}\n1,{texts[1]}\n")
+    (flag,) = log.channels
+    assert flag.values.tolist() == values
+    assert "texts taken as a flag" in flag.notes[0]
+
+
+@pytest.mark.parametrize("texts", [("eco", "sport"), ("on", "sport"), ("on", "active")])
+def test_other_texts_are_no_flag(texts: tuple[str, str]) -> None:
+    log = read(f"time [s],x,mode\n0,1,{texts[0]}\n1,2,{texts[1]}\n")
+    assert [one.name for one in log.channels] == ["x"]

@@ -208,6 +208,37 @@ def select_numbers(texts: Sequence[str], codes: FloatArray) -> NumberTexts | Non
     return NumberTexts(values, "" if same else note)
 
 
+def read_flag(texts: Iterable[str]) -> dict[str, float] | None:
+    """Read the texts of a flag as 1 and 0; None where they are no two states.
+
+    One text denies the other, as `Shift in process` and `Shift is not in process`, or both are
+    usual words, as `on` and `off`. A flag that never changes has one text.
+    """
+    found = {text: _read_state(text) for text in texts}
+    values = [one for one in found.values() if one is not None]
+    if len(values) < len(found) or len(values) != len(set(values)):
+        return None
+    return {text: one for text, one in found.items() if one is not None}
+
+
+def _read_state(text: str) -> float | None:
+    """Return 0 for a text that denies a state and 1 for one that affirms it; None for others."""
+    bare = re.sub(r"^b(['\"])(.*)\1$", r"\2", text.strip())
+    words = re.findall(r"[A-Z]?[^\W\d_A-Z]+|[A-Z]+", bare)
+    plain = {word.casefold() for word in words}
+    if plain & _DENIES:
+        return 0.0
+    return 1.0 if plain & _AFFIRMS else None
+
+
+_DENIES = frozenset(
+    ("not", "no", "off", "false", "inactive", "disengaged", "disabled", "nicht", "nein", "aus")
+)
+_AFFIRMS = frozenset(
+    ("yes", "on", "true", "active", "engaged", "enabled", "process", "progress", "ja", "ein", "an")
+)
+"""Words of the two states of a flag."""
+
 _DECIMAL = r"\d+(?:[.,]\d*)?|[.,]\d+"
 _WITH_UNIT = re.compile(rf"([+-]?(?:{_DECIMAL})(?:[eE][+-]?\d+)?)\s*([^\W\d_]+)", re.ASCII)
 """`0.001 sec` of MATLAB, `1.5ms`."""

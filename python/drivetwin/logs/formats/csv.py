@@ -28,7 +28,7 @@ from drivetwin.channels.read_options import Column, ReadOptions, TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, TimeError, Where
-from drivetwin.logs.formats.cell_text import is_time_text, parse_time_texts
+from drivetwin.logs.formats.cell_text import is_time_text, parse_time_texts, read_flag
 from drivetwin.logs.formats.long_table import find_long_layout, read_long
 from drivetwin.logs.formats.table_columns import TableColumns, parse_table_columns, unpack_clock
 from drivetwin.logs.formats.table_head import (
@@ -113,14 +113,20 @@ class CsvRecording:
             self._stamps = stamps.parse_texts(table, text, bool(dates))
         else:
             self._stamps, notices = self._count_stamps(stamps, self._take_numbers(table, clocks))
+        if self._header.calendar:
+            names = self._header.names
+            left = ", ".join(names[index] for index in self._header.calendar)
+            notices += (f"several time columns: {names[clocks[0]]} is used, not {left}",)
         self.warnings: tuple[str, ...] = (*notes, *notices)
         others = [index for index in range(len(self._header.names)) if self._is_channel(index)]
-        sound = [index for index in others if self._contents[index].fault is None]
-        faulty = [index for index in others if self._contents[index].fault is not None]
+        self._flags = self._find_flags(others)
+        numbered = [index for index in others if self._contents[index].fault is None]
+        sound = sorted([*numbered, *self._flags])
+        faulty = [index for index in others if index not in sound]
         self._places = (*sound, *faulty)
         names, units = self._header.names, self._header.units
         if at_once:
-            self._kept = self._take_numbers(table, sound)
+            self._kept = self._take_numbers(table, numbered)
         self.columns = (
             *(Column(names[index], units[index]) for index in sound),
             *(Column(names[index], empty=True) for index in faulty),
@@ -130,7 +136,7 @@ class CsvRecording:
         """Return a column; raises DamagedChannelError where it holds texts. See `Recording`."""
         place = self._places[index]
         name, unit = self._header.names[place], self._header.units[place]
-        if (fault := self._contents[place].fault) is not None:
+        if (fault := self._contents[place].fault) is not None and place not in self._flags:
             where = Where(file=self._reader.text.file, channel=name)
             raise DamagedChannelError(
                 fault, "repair or empty the cell, or map another column", where
@@ -145,15 +151,36 @@ class CsvRecording:
 
     def _is_channel(self, index: int) -> bool:
         """Return False for time, date, and blank columns of labels or remarks."""
-        if index in self._header.clocks or index == self._header.date:
+        if index in (*self._header.clocks, *self._header.calendar, self._header.date):
             return False
         name, contents = self._header.names[index], self._contents[index]
         is_empty = not contents.count and not contents.texts
         is_aside = not name or is_remark_name(name) or index < self._header.clocks[0]
         return not (is_empty and is_aside)
 
+    def _find_flags(self, places: Sequence[int]) -> dict[int, dict[str, float]]:
+        """Find the columns of texts that are flags, with the number of each text."""
+        found = {}
+        for index in places:
+            contents = self._contents[index]
+            if contents.fault is not None and not contents.count:
+                states = read_flag(contents.texts)
+                if states is not None:
+                    found[index] = states
+        return found
+
+    def _load_flag(self, place: int) -> Numbers:
+        states = self._flags[place]
+        table = self._reader.scan((), [place], self._rows)
+        cells = list_texts(table, 0, self._reader.text)
+        values = np.array([states.get(cell, np.nan) for cell in cells])
+        named = ", ".join(f"{text!r} is {value:.0f}" for text, value in states.items())
+        return Numbers(values, np.isfinite(values), (f"texts taken as a flag: {named}",))
+
     def _load_numbers(self, place: int) -> Numbers:
         """Return a column; the sound ones after it are read in the same pass."""
+        if place in self._flags:
+            return self._load_flag(place)
         if place not in self._kept:
             sound = [one for one in self._places if self._contents[one].fault is None]
             start = sound.index(place)

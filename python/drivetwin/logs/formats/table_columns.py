@@ -33,6 +33,7 @@ from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import is_time_unit, is_unit
 from drivetwin.errors import TimeError, Where
+from drivetwin.logs.formats.cell_text import is_time_text
 from drivetwin.logs.formats.table_head import TableHead, is_physical_unit, is_remark_name
 
 _DATE_NAMES = frozenset(("date", "datum"))
@@ -49,6 +50,8 @@ class TableColumns:
     units: Sequence[str | None]
     times: Sequence[int]
     is_packed_clock: bool = False
+    calendar: tuple[int, ...] = ()
+    """Columns of dates with clock times that stand beside a time column in numbers."""
 
     @cached_property
     def is_paired(self) -> bool:
@@ -86,8 +89,24 @@ def parse_table_columns(head: TableHead, time: TimeColumn, file: str) -> TableCo
         above = _find_units_above(head, len(names))
         units = [beside or over for beside, over in zip(units, above, strict=True)]
     meant = apply_conventions(head, Columns(names, units))
-    times = _assign_time_columns(meant.names, meant.units, time, file)
-    return TableColumns(meant.names, meant.units, times, meant.is_packed_clock)
+    calendar = _find_calendar(meant, head, time)
+    units = [None if k in calendar else unit for k, unit in enumerate(meant.units)]
+    names = ["" if k in calendar else name for k, name in enumerate(meant.names)]
+    times = _assign_time_columns(names, units, time, file)
+    return TableColumns(meant.names, meant.units, times, meant.is_packed_clock, calendar)
+
+
+def _find_calendar(meant: Columns, head: TableHead, time: TimeColumn) -> tuple[int, ...]:
+    """Find time columns of texts beside one of numbers, which tells the same with less ado.
+
+    A data frame with an index of dates keeps the time column that it had.
+    """
+    found = find_time_indices(meant.names, meant.units, time)
+    if len(found) < 2 or not head.rows:
+        return ()
+    cells = head.rows[0].cells
+    texts = tuple(k for k in found if k < len(cells) and is_time_text(cells[k]))
+    return texts if len(texts) == len(found) - 1 else ()
 
 
 def _fit(cells: Sequence[str], width: int) -> list[str]:
