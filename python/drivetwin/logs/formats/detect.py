@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -14,7 +15,7 @@ from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.texts import refuse_bus_tool
 from drivetwin.logs.formats.guarded import open_guarded
-from drivetwin.logs.raw import HEAD_BYTES, Opener, Recording
+from drivetwin.logs.raw import HEAD_BYTES, Joined, Opener, Recording
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,21 @@ def open_recording(
     chosen = _select_format(head, path)
     options = options or ReadOptions()
     if chosen.guarded:
-        return open_guarded(chosen.load_opener(), path, options)
-    return chosen.load_opener()(path, options)
+        return _add_net_torque(open_guarded(chosen.load_opener(), path, options))
+    return _add_net_torque(chosen.load_opener()(path, options))
+
+
+@contextmanager
+def _add_net_torque(opened: AbstractContextManager[Recording]) -> Iterator[Recording]:
+    """Add the net torque of the engine where a decoded bus has it in percent."""
+    with opened as recording:
+        if not any("percenttorque" in one.name.casefold() for one in recording.columns):
+            yield recording
+            return
+        from drivetwin.logs.formats.j1939.torque import find_net_torque  # few logs are of a bus
+
+        net = find_net_torque(recording)
+        yield recording if net is None else Joined((recording, net))
 
 
 def _select_format(head: bytes, path: Path) -> LogFormat:

@@ -80,3 +80,35 @@ def test_a_truck_in_gear_runs_at_the_ratio_of_its_gear(truck: Path) -> None:
         assert np.nanmedian(ratio[in_gear]) == pytest.approx(card.compute_ratio(name), rel=2e-3)
     assert log["engine_torque"].source_name == "EngNetTorque"
     assert log["engine_torque"].values.max() < 1109.0
+
+
+PERCENT = (
+    "time [s],ActualEngPercentTorque,NominalFrictionPercentTorque,EngReferenceTorque\n"
+    "0.00,40,6,{first}\n0.02,50,6,650\n0.04,60,6,650\n"
+)
+
+
+def test_a_decoded_bus_has_the_net_torque(tmp_path: Path) -> None:
+    path = tmp_path / "bus.csv"
+    path.write_text(PERCENT.format(first=650))
+    log = read_raw(path)
+    (net,) = (one for one in log.channels if one.name == torque.NET_TORQUE)
+    assert net.unit == "Nm"
+    assert net.values == pytest.approx([221.0, 286.0, 351.0])
+    assert "in percent of 650 N·m (EngReferenceTorque), less friction" in net.notes
+
+
+def test_a_reference_torque_that_changes_gives_no_torque(tmp_path: Path) -> None:
+    path = tmp_path / "bus.csv"
+    path.write_text(PERCENT.format(first=700))
+    log = read_raw(path)
+    assert torque.NET_TORQUE not in [one.name for one in log.channels]
+
+
+def test_a_net_torque_of_the_file_is_not_derived_again(tmp_path: Path) -> None:
+    path = tmp_path / "bus.csv"
+    text = PERCENT.format(first=650)
+    lines = text.splitlines()
+    path.write_text("\n".join([lines[0] + ",EngNetTorque", *(one + ",1" for one in lines[1:])]))
+    named = [one.name for one in read_raw(path).channels]
+    assert named.count(torque.NET_TORQUE) == 1

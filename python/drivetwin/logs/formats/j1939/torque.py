@@ -3,11 +3,16 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
+
 import numpy as np
 
+from drivetwin.channels.read_options import Column
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
-from drivetwin.logs.raw import RawChannel
+from drivetwin.errors import DamagedChannelError, Where
+from drivetwin.logs.raw import RawChannel, Recording, Window
 
 REFERENCE = 544
 """Engine reference torque [N·m]: what 100 % means."""
@@ -64,6 +69,60 @@ def compute_net_torque(actual: RawChannel, friction: RawChannel) -> RawChannel:
     missing = (f"{lost} samples without friction torque left out",) if lost else ()
     notes = tuple(dict.fromkeys((*actual.notes, *friction.notes, *missing)))
     return RawChannel(NET_TORQUE, UNIT, actual.time[known], values[known], actual.group, notes)
+
+
+@dataclass(frozen=True)
+class NetTorque:
+    """Recording of one column: the net torque from the columns of another one.
+
+    `actual`, `friction` and `reference` are places of the columns of `source`, in %, % and N·m.
+    Source: SAE J1939-71, SPN 513, 514 and 544.
+    """
+
+    source: Recording
+    actual: int
+    friction: int
+    reference: int
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The one column."""
+        return (Column(NET_TORQUE, UNIT),)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """None of its own."""
+        return ()
+
+    def load(self, _: int, window: Window | None = None) -> RawChannel:
+        """Return the net torque. Raises DamagedChannelError where the reference torque changes."""
+        reference = self.source.load(self.reference)
+        known = np.unique(reference.values[np.isfinite(reference.values)])
+        if known.size != 1:
+            raise DamagedChannelError(
+                f"{reference.name} has {known.size} values, one reference torque is needed",
+                "state the engine torque in a channel mapping",
+                Where(channel=NET_TORQUE),
+            )
+        note = f"in percent of {known[0]:g} N·m ({reference.name}), less friction"
+        actual, friction = (
+            convert_to_torque(self.source.load(place, window), float(known[0]), note)
+            for place in (self.actual, self.friction)
+        )
+        return compute_net_torque(actual, friction)
+
+
+def find_net_torque(source: Recording) -> NetTorque | None:
+    """Find the net torque in the columns of a decoded bus; None without one column of each name."""
+    names = [re.sub(r"[^a-z]", "", one.name.casefold()) for one in source.columns]
+    if NET_TORQUE.casefold() in names:
+        return None
+    places = [names.index(name) for name in _DECODED if names.count(name) == 1]
+    return NetTorque(source, *places) if len(places) == len(_DECODED) else None
+
+
+_DECODED = ("actualengpercenttorque", "nominalfrictionpercenttorque", "engreferencetorque")
+"""Names of SPN 513, 514 and 544 in the data base of the standard, spelled in small letters."""
 
 
 def _make_channel(raw: RawChannel) -> Channel:
