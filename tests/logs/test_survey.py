@@ -43,7 +43,7 @@ def test_a_held_signal_shows_its_sender_rate(tmp_path: Path) -> None:
 
 def test_a_column_without_numbers_is_told(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    path.write_text("time [s],n [rpm],state\n0,1,on\n1,2,off\n")
+    path.write_text("time [s],n [rpm],state\n0,1,eco\n1,2,sport\n")
     found = surveyed(path)
     assert [column.name for column in found.columns] == ["n"]
-    assert found.notes[0] == "state: line 2: 'on' is no number"
+    assert found.notes[0] == "state: line 2: 'eco' is no number"
