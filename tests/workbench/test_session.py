@@ -65,7 +65,7 @@ def test_why_an_identification_ended_early_is_kept_until_the_next(session: Sessi
     session.identify([Method.INTEGRAL])
     assert session.job is not None
     session.job.process.kill()
-    with pytest.raises(InputError, match="stopped") as ended:
+    with pytest.raises(InputError, match="was killed by") as ended:
         finish(session)
     assert session.work.ended == str(ended.value)
     session.identify([Method.PAPER])

@@ -142,7 +142,7 @@ def require_explained(found: Correction) -> None:
         f"the corrected twin does not explain the {_PHASES[worst.phase]}: {worst.role} departs by "
         f"{rms} (RMS), {worst.ratio:.1f} times the {expected} that noise and usual "
         f"errors of the model explain{rest}",
-        "check that --start is the calibration of the log, and that the twin is of this vehicle; "
+        "check that the start is the calibration of the log, and that the twin is of this vehicle; "
         "else identify the vehicle again from a log of this shift",
         Where(file=worst.file, channel=worst.channel, time=worst.time),
     )

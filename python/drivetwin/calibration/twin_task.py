@@ -196,7 +196,7 @@ def build_oil_state(twin: Twin, request: Request) -> OilState:
         raise InputError(
             f"the twin {twin.name!r} does not say which oil temperature its log had",
             "identify a log with the role temperature.oil, or state log_temperature_C under [oil] "
-            "in the file of --limits",
+            "in the file of limits",
         )
     return OilState(wanted - known, friction)
 

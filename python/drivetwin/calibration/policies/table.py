@@ -52,7 +52,7 @@ def _build_slip(setup: PolicySetup) -> Policy:
     if setup.maneuver.inertia_first:
         raise InputError(
             "the policy 'slip' has the torque phase first, and this shift the inertia phase",
-            "take --policy controller or knots, or your own controller (--controller FILE)",
+            "take the policy controller or knots, or your own controller in C",
         )
     return build_slip_policy(setup.maneuver, setup.system_pressure, setup.unit, setup.task)
 
