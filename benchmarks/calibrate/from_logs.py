@@ -32,13 +32,13 @@ import numpy as np
 
 from benchmarks.calibrate.true_units import draw_true_units, record_shift
 from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
-from benchmarks.estimation.vehicles import SHIFT
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, build_objective, find_best, make_quick_plant
 from drivetwin.calibration.driven import DrivenShift, match_profiles
 from drivetwin.calibration.learn import correct_twin, require_explained
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective
+from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
 from drivetwin.calibration.profiles import Profiles
@@ -118,7 +118,7 @@ class Trial:
 
 def learn_vehicle(made: MadeVehicle, given: argparse.Namespace) -> Trial:
     """Calibrate one vehicle from its logs, and find the optimum on its true units."""
-    request = _build_request(made, given.effort)
+    request = made.build_request(PolicyKind.CONTROLLER, _LIGHT.scale_effort(given.effort))
     task = build_task(made.twin, request)
     limits = tuple(one for one in task.limits if one.metric is Metric.SHIFT_TIME)
     request, task = replace(request, limits=limits), task.set_limits(limits)
@@ -190,18 +190,6 @@ def _compare(
 def _assess(objective: Objective, outcome: Outcome) -> float:
     """Return the objective without the penalty on second slips."""
     return objective.evaluate(outcome) - objective.weight * float(outcome.relocked.mean())
-
-
-def _build_request(made: MadeVehicle, effort: float) -> Request:
-    motion, drive = made.recorded.trajectory, made.scenario
-    return Request(
-        gears=(drive.start_gear, drive.end_gear),
-        wheel_radius=0.5,
-        engine_torque=drive.engine_torque.knots[-1][1],
-        engine_speed=float(np.interp(SHIFT, motion.time, motion.engine_speed)),
-        settings=_LIGHT.scale_effort(effort),
-        seed=made.seed,
-    )
 
 
 def try_vehicle(seed: int, given: argparse.Namespace) -> Trial:

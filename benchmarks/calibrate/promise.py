@@ -29,7 +29,6 @@ import numpy as np
 
 from benchmarks.calibrate.true_units import draw_true_units
 from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
-from benchmarks.estimation.vehicles import SHIFT
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.metrics import Metric
@@ -38,7 +37,7 @@ from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.twin_task import Request, build_task
+from drivetwin.calibration.twin_task import build_task
 from drivetwin.errors import DrivetwinError
 
 _COUNT, _HELD, _REFUSED = 24, 20, 4
@@ -91,7 +90,9 @@ def _calibrate(
     The search begins at `start`, at equal places between the bounds as on a map.
     """
     request = replace(
-        _build_request(made, given.effort),
+        made.build_request(
+            PolicyKind.CONTROLLER, CalibrationSettings(threads=1).scale_effort(given.effort)
+        ),
         oil_temperature=_LOG + oil.change,
         oil=replace(oil.friction, log_temperature=_LOG),
     )
@@ -105,19 +106,6 @@ def _calibrate(
     warm = [replace(one, model=oil.warm(one.model)) for one in units.units]
     outcome = replace(units, units=warm).evaluate(found.after.control)
     return found, outcome.values[Metric.PEAK_JERK]
-
-
-def _build_request(made: MadeVehicle, effort: float) -> Request:
-    motion, drive = made.recorded.trajectory, made.scenario
-    return Request(
-        gears=(drive.start_gear, drive.end_gear),
-        wheel_radius=0.5,
-        engine_torque=drive.engine_torque.knots[-1][1],
-        engine_speed=float(np.interp(SHIFT, motion.time, motion.engine_speed)),
-        policy=PolicyKind.CONTROLLER,
-        settings=CalibrationSettings(threads=1).scale_effort(effort),
-        seed=made.seed,
-    )
 
 
 def main() -> int:

@@ -32,7 +32,10 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Runs, compute_metrics
+from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.profiles import ClosedLoop
+from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.twin_task import Request
 from drivetwin.channels.roles import Quantity, make_command_role
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import ControlledActuator, Program
@@ -127,6 +130,19 @@ class MadeVehicle:
         start = replace(shift, model=self.scenario.model).build_start()
         acting = self.build_acting(torque, pressures)
         return replace(self.vehicle, **acting).simulate(start, time)
+
+    def build_request(self, policy: PolicyKind, settings: CalibrationSettings) -> Request:
+        """Return the calibration of the log's shift on the twin, at its operating point."""
+        motion, drive = self.recorded.trajectory, self.scenario
+        return Request(
+            gears=(drive.start_gear, drive.end_gear),
+            wheel_radius=0.5,
+            engine_torque=drive.engine_torque.knots[-1][1],
+            engine_speed=float(np.interp(SHIFT, motion.time, motion.engine_speed)),
+            policy=policy,
+            settings=settings,
+            seed=self.seed,
+        )
 
     def build_acting(self, torque: Signal, pressures: dict[str, Signal]) -> ActingInputs:
         """Return engine torque and pressures as they act on the vehicle."""

@@ -20,14 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle, measure_true_shift
-from benchmarks.estimation.vehicles import SHIFT
+from benchmarks.calibrate.true_vehicle import make_vehicle, measure_true_shift
 from drivetwin.calibration.calibrate import Assessment, calibrate
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.calibration.twin_task import Request, build_task
+from drivetwin.calibration.twin_task import build_task
 from drivetwin.errors import DrivetwinError
 
 _SHARE, _IMPROVEMENT = 0.9, 2.5
@@ -51,7 +50,9 @@ def try_vehicle(seed: int, effort: float) -> Trial:
     """Identify, calibrate and try one vehicle; print a line."""
     begin = time.process_time()
     made = make_vehicle(seed)
-    request = _build_request(made, effort)
+    request = made.build_request(
+        PolicyKind.SLIP, CalibrationSettings(threads=1).scale_effort(effort)
+    )
     found = calibrate(build_task(made.twin, request))
     promised = found.after.certificate.quantiles[Metric.PEAK_JERK].share_95
     shift = found.task.maneuver
@@ -68,19 +69,6 @@ def try_vehicle(seed: int, effort: float) -> Trial:
     )
     sys.stdout.flush()
     return trial
-
-
-def _build_request(made: MadeVehicle, effort: float) -> Request:
-    motion, drive = made.recorded.trajectory, made.scenario
-    return Request(
-        gears=(drive.start_gear, drive.end_gear),
-        wheel_radius=0.5,
-        engine_torque=drive.engine_torque.knots[-1][1],
-        engine_speed=float(np.interp(SHIFT, motion.time, motion.engine_speed)),
-        policy=PolicyKind.SLIP,
-        settings=CalibrationSettings(threads=1).scale_effort(effort),
-        seed=made.seed,
-    )
 
 
 def main() -> int:

@@ -308,8 +308,8 @@ def add_exact(twin: Twin, values: Mapping[str, float]) -> Twin:
 def list_added(twin: Twin, shift: Shift, *, commanded: bool) -> list[AddedUnknown]:
     """List the unknowns of the path from `commanded` profiles to the clutches; else there are none.
 
-    The age of a torque message cannot be told from a lag of the torque, and a closed slip loop has
-    no path.
+    A delay of the torque message and a lag of the torque cannot be separated, and a closed slip
+    loop has no path.
     """
     if not commanded:
         return []

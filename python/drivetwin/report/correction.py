@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What logs of its shifts taught about a vehicle, as blocks."""
+"""Correction of a twin by logs of one vehicle, as blocks."""
 
 from __future__ import annotations
 

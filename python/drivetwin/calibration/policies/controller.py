@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -33,11 +34,12 @@ _SHORTEST = 1e-3
 
 
 @dataclass(frozen=True)
-class ControllerPolicy(Policy):
-    """Profiles from the controller's own parameters; see `build_controller_policy`.
+class ProfilePolicy(Policy):
+    """Policy whose parameters shape profiles of a shift.
 
     `request` and `horizon` [s] as in `Maneuver`; `engine_torque` [N m] is the driver's demand,
-    `direction` the sign of the torque intervention, `system_pressure` [Pa] that of a held element.
+    `direction` the sign of the change of engine speed, `system_pressure` [Pa] that of a held
+    element.
     """
 
     request: float
@@ -45,6 +47,23 @@ class ControllerPolicy(Policy):
     engine_torque: float
     direction: float
     system_pressure: float
+
+    @classmethod
+    def build(
+        cls, parameters: tuple[PolicyParameter, ...], maneuver: Maneuver, system_pressure: float
+    ) -> Self:
+        """Build the policy of a shift from its parameters."""
+        point = maneuver.point
+        times = maneuver.request, maneuver.horizon
+        return cls(parameters, *times, point.engine_torque, maneuver.direction, system_pressure)
+
+
+@dataclass(frozen=True)
+class ControllerPolicy(ProfilePolicy):
+    """Profiles from the controller's own parameters; see `build_controller_policy`.
+
+    The torque intervention has the sign of `direction`.
+    """
 
     def build_control(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
@@ -109,14 +128,7 @@ def build_controller_policy(maneuver: Maneuver, system_pressure: float) -> Contr
         *_list_inertia_parameters(pressures),
         *_list_torque_parameters(abs(maneuver.point.engine_torque)),
     )
-    return ControllerPolicy(
-        parameters,
-        maneuver.request,
-        maneuver.horizon,
-        maneuver.point.engine_torque,
-        maneuver.direction,
-        system_pressure,
-    )
+    return ControllerPolicy.build(parameters, maneuver, system_pressure)
 
 
 def build_profile(horizon: float, *corners: tuple[float, float]) -> Signal:

@@ -17,8 +17,12 @@ from dataclasses import dataclass
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.policies.controller import build_profile, list_fill_parameters
-from drivetwin.calibration.policy import Policy, PolicyParameter
+from drivetwin.calibration.policies.controller import (
+    ProfilePolicy,
+    build_profile,
+    list_fill_parameters,
+)
+from drivetwin.calibration.policy import PolicyParameter
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.torque_balance import (
     REDUCTION,
@@ -32,19 +36,11 @@ _RISE = 0.05
 
 
 @dataclass(frozen=True)
-class InertiaFirstPolicy(Policy):
+class InertiaFirstPolicy(ProfilePolicy):
     """Profiles from the controller's own parameters; see `build_inertia_first_policy`.
 
-    `request` and `horizon` [s] as in `Maneuver`; `engine_torque` [N m] is the driver's demand,
-    `direction` the sign of the change of engine speed, `system_pressure` [Pa] that of a held
-    element.
+    The torque intervention is against `direction`.
     """
-
-    request: float
-    horizon: float
-    engine_torque: float
-    direction: float
-    system_pressure: float
 
     def build_control(self, values: FloatArray) -> Profiles:
         """Return the profiles of values (p,) in SI."""
@@ -110,14 +106,7 @@ def build_inertia_first_policy(maneuver: Maneuver, system_pressure: float) -> In
         *_list_torque_phase_parameters(pressures),
         *_list_torque_parameters(abs(maneuver.point.engine_torque)),
     )
-    return InertiaFirstPolicy(
-        parameters,
-        maneuver.request,
-        maneuver.horizon,
-        maneuver.point.engine_torque,
-        maneuver.direction,
-        system_pressure,
-    )
+    return InertiaFirstPolicy.build(parameters, maneuver, system_pressure)
 
 
 def _list_inertia_parameters(

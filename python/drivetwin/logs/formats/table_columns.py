@@ -97,7 +97,7 @@ def parse_table_columns(head: TableHead, time: TimeColumn, file: str) -> TableCo
 
 
 def _find_calendar(meant: Columns, head: TableHead, time: TimeColumn) -> tuple[int, ...]:
-    """Find time columns of texts beside one of numbers, which tells the same with less ado.
+    """Find the time columns of texts beside one of numbers.
 
     A data frame with an index of dates keeps the time column that it had.
     """
