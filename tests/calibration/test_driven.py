@@ -139,7 +139,7 @@ def test_logs_of_another_vehicle_are_refused_with_signal_and_phase(
     assert caught.value.where.file is not None
     assert caught.value.where.channel is not None
     assert caught.value.where.time is not None
-    assert "--start" in caught.value.remedy
+    assert "identify the vehicle again" in caught.value.remedy
 
 
 def test_the_path_delays_lags_and_scales_inputs() -> None:
