@@ -118,13 +118,13 @@ def _estimate_from_speeds(
 def _to_document(
     found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults
 ) -> dict[str, Any]:
-    from drivetwin.files.result_file import RejectedRecord, ShiftRecord
+    from drivetwin.files.result_file import ShiftRecord
     from drivetwin.shifts.summary import summarize_shifts
 
     return {
         "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
         "summary": [asdict(one) for one in summarize_shifts(found.shifts)],
-        "rejected": [RejectedRecord.from_result(one).model_dump() for one in found.rejected],
+        "rejected": [asdict(one) for one in found.rejected],
         "lock_ups": [asdict(one) for one in closings],
         "resonances": [_convert_resonance(*pair) for pair in seen.swings],
         "held_gears": [asdict(one) for one in seen.gears],

@@ -30,9 +30,9 @@ from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.errors import ResultFileError, Where
-from drivetwin.estimation.result.estimate import OF_RATIO, Estimate, FrictionCurve, LoadLaw, Verdict
+from drivetwin.estimation.result.estimate import OF_RATIO, Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.suggestion import (
-    CardNumberKind,
+    CardNumber,
     Experiment,
     ExperimentRanking,
 )
@@ -58,9 +58,14 @@ _BY_NAME = {"by": "name"}
 
 
 class Record(BaseModel):
-    """Base of all records: closed key set, immutable."""
+    """Base of all records: closed key set, immutable.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    A dataclass whose fields are the keys is its own record; this configuration holds for it too.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False
+    )
 
     @classmethod
     def from_result(cls, result: object) -> Self:
@@ -78,31 +83,6 @@ class Record(BaseModel):
         return source
 
 
-class StribeckRecord(Record):
-    """μ(s) = mu_c + (mu_s - mu_c)·exp(-|s|/v_s) + mu_v·|s|; v_s in rad/s, mu_v in s/rad."""
-
-    mu_c: FiniteFloat
-    mu_s: FiniteFloat
-    v_s: FiniteFloat
-    mu_v: FiniteFloat
-
-
-class LoadRecord(Record):
-    """T_v(ω) = i_f·(T_v/i_f) + aero·(ω·|ω| - mean_speed²) at the wheel; `std` of aero, total.
-
-    aero in N·m·s²/rad², mean_speed in rad/s; `divide_by_eta`: aero is divided by η, as T_v/i_f is.
-    """
-
-    aero: FiniteFloat
-    std: FiniteFloat
-    mean_speed: FiniteFloat
-    over_eta: bool = False
-
-    def to_law(self) -> LoadLaw:
-        """Back to the law."""
-        return LoadLaw(**self.model_dump())
-
-
 class FrictionRecord(Record):
     """μ over |slip| [rad/s] of one element with its 95 % band, over the slip range seen."""
 
@@ -110,7 +90,7 @@ class FrictionRecord(Record):
     mu: list[FiniteFloat]
     mu_lo: list[OptionalFloat]
     mu_hi: list[OptionalFloat]
-    stribeck: StribeckRecord | None = None
+    stribeck: Stribeck | None = None
     stribeck_covariance: list[list[FiniteFloat]] | None = None
     method: str
     gain_m3: OptionalFloat = None
@@ -153,7 +133,7 @@ class FrictionRecord(Record):
             mu_hi=_build_array(self.mu_hi),
             points_slip=np.empty(0),
             points_mu=np.empty(0),
-            stribeck=None if self.stribeck is None else Stribeck(**self.stribeck.model_dump()),
+            stribeck=self.stribeck,
             method=self.method.removesuffix(OF_RATIO),
             stribeck_covariance=None
             if self.stribeck_covariance is None
@@ -306,16 +286,6 @@ class ProspectRecord(Record):
     shift: str = ""
 
 
-class CardNumberRecord(Record):
-    """Number of a vehicle card that would narrow a parameter if it were exact: a parameter, an
-    effect or a sensor error. `share` is the width of the interval then over the present width."""
-
-    kind: CardNumberKind
-    name: str
-    subject: str = ""
-    share: float
-
-
 class SuggestionRecord(Record):
     """A parameter, its 95 % half width now (null where open), and all experiments by their worth.
 
@@ -329,7 +299,7 @@ class SuggestionRecord(Record):
     half_width: OptionalFloat
     text: str
     experiments: list[ProspectRecord]
-    number: CardNumberRecord | None = None
+    number: CardNumber | None = None
 
     @model_validator(mode="before")
     @classmethod

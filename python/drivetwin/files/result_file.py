@@ -13,7 +13,9 @@ from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
-from drivetwin.estimation.identification import Identification, LogShare
+from drivetwin.estimation.identification import Identification, LogPull, LogShare
+from drivetwin.estimation.result.cause import Group
+from drivetwin.estimation.result.estimate import LoadLaw
 from drivetwin.estimation.result.method import Method, ModelStatus
 from drivetwin.estimation.result.validation import HeldOut, Outcome
 from drivetwin.files.records import (
@@ -22,7 +24,6 @@ from drivetwin.files.records import (
     FitRecord,
     FrictionRecord,
     Interval,
-    LoadRecord,
     OptionalFloat,
     ParameterRecord,
     Record,
@@ -30,16 +31,8 @@ from drivetwin.files.records import (
     SuggestionRecord,
     read_record,
 )
-from drivetwin.vehicle.effects import EffectId
+from drivetwin.shifts.shift import RejectedShift
 from drivetwin.vehicle.shift_kind import ShiftKind
-
-
-class MoveRecord(Record):
-    """How far one log moves a parameter from what the others say, in standard deviations."""
-
-    parameter: str
-    log: int
-    z: FiniteFloat
 
 
 class ConsistencyRecord(Record):
@@ -50,7 +43,7 @@ class ConsistencyRecord(Record):
     p: FiniteFloat
     agree: bool
     text: str
-    moves: list[MoveRecord]
+    moves: list[LogPull]
 
 
 class LogRecord(Record):
@@ -145,28 +138,14 @@ class ShiftRecord(Record):
     findings: list[FindingRecord]
 
 
-class RejectedRecord(Record):
-    """A stretch of the log that is no usable shift, and why."""
-
-    time: Interval
-    reason: str
-
-
-class GroupRecord(Record):
-    """An effect that the model leaves out, and the element, gear or frequency that has it."""
-
-    effect: EffectId
-    subject: str
-
-
 class CauseRecord(Record):
     """Effect beyond the model that the log shows; `size` and `std` in the unit of the effect."""
 
-    group: GroupRecord
+    group: Group
     evidence: FiniteFloat
     size: FiniteFloat
     std: OptionalFloat
-    equivalent: list[GroupRecord]
+    equivalent: list[Group]
     next_evidence: FiniteFloat
     is_certain: bool
     in_plant: bool = False
@@ -184,10 +163,10 @@ class ResultFile(Record):
     cause: CauseRecord | None = None
     parameters: dict[str, ParameterRecord]
     friction: dict[str, FrictionRecord]
-    load: LoadRecord | None = None
+    load: LoadLaw | None = None
     actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
     shifts: list[ShiftRecord]
-    rejected: list[RejectedRecord]
+    rejected: list[RejectedShift]
     fit: dict[str, dict[str, FitRecord]]
     validity: dict[str, Interval]
     inputs: dict[str, str]

@@ -25,13 +25,13 @@ from drivetwin.channels.read_options import (
     TimeColumn,
 )
 from drivetwin.errors import InputError, ResultFileError, suggest_spelling
+from drivetwin.estimation.result.estimate import LoadLaw
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.records import (
     ActuatorRecord,
     CovarianceRecord,
     FrictionRecord,
     Interval,
-    LoadRecord,
     OptionalFloat,
     ParameterRecord,
     Record,
@@ -49,13 +49,6 @@ _HEADER = (
     "An identified driveline model; written by drivetwin. All values in SI units:",
     "rad, s, N*m, kg*m^2, Pa. A parameter without 'value' could not be determined from the log.",
 )
-
-
-class GearRecord(Record):
-    """One gear: overall ratio (input gear included) and the shift element that holds it."""
-
-    ratio: FiniteFloat = Field(gt=0)
-    element: str
 
 
 class ElementRecord(Record):
@@ -116,18 +109,6 @@ class LogRecord(Record):
         return ReadOptions(time, bus, tuple(self.ignored))
 
 
-class ConverterRecord(Record):
-    """Map of the torque converter: capacity [N m s^2/rad^2] and torque ratio over speed ratio."""
-
-    speed_ratio: list[FiniteFloat]
-    capacity: list[FiniteFloat]
-    torque_ratio: list[FiniteFloat]
-
-    def to_converter(self) -> Converter:
-        """Return the map."""
-        return Converter(tuple(self.speed_ratio), tuple(self.capacity), tuple(self.torque_ratio))
-
-
 class TransmissionRecord(Record):
     """Transmission design data from the vehicle card."""
 
@@ -135,10 +116,10 @@ class TransmissionRecord(Record):
     final_drive: FiniteFloat = Field(gt=0)
     J_prime_range: Interval = Field(alias="J_prime_range_kgm2")
     J_vehicle_range: Interval = Field(alias="J_vehicle_range_kgm2")
-    gears: dict[str, GearRecord]
+    gears: dict[str, TwinGear]
     elements: dict[str, ElementRecord]
     channels: dict[str, ChannelRecord] = Field(default_factory=dict)
-    converter: ConverterRecord | None = None
+    converter: Converter | None = None
 
 
 class TwinParameterRecord(ParameterRecord):
@@ -159,7 +140,7 @@ class TwinFile(Record):
     log: LogRecord | None = None
     parameters: dict[str, TwinParameterRecord]
     friction: dict[str, FrictionRecord]
-    load: LoadRecord | None = None
+    load: LoadLaw | None = None
     covariance: CovarianceRecord | None = None
     actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
     validity: dict[str, Interval]
@@ -336,18 +317,16 @@ def restore_twin(content: TwinFile) -> Twin:
         **same
         | design
         | {
-            "gears": {name: TwinGear(**dict(one)) for name, one in gearbox.gears.items()},
             "elements": {name: TwinElement(**dict(one)) for name, one in gearbox.elements.items()},
             "mapping": RememberedMapping(
                 {role: one.to_channel() for role, one in gearbox.channels.items()},
                 ReadOptions() if content.log is None else content.log.to_options(),
             ),
-            "converter": None if gearbox.converter is None else gearbox.converter.to_converter(),
             "parameters": {name: one.to_estimate(name) for name, one in content.parameters.items()},
             "friction": {name: one.to_curve() for name, one in content.friction.items()},
             "assumptions": tuple(content.assumptions),
             "actuators": {name: one.to_actuator() for name, one in content.actuators.items()},
-            "load_law": None if content.load is None else content.load.to_law(),
+            "load_law": content.load,
             "covariance_ids": () if covariance is None else tuple(covariance.ids),
             "covariance": None if covariance is None else np.asarray(covariance.matrix),
         }

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.rich_display import DisplayMixin
@@ -60,7 +61,7 @@ SIMULATED = (
 class TwinGear:
     """A gear: overall ratio i_in·i_c·i_out and the shift element that holds it."""
 
-    ratio: float
+    ratio: Annotated[float, Field(gt=0)]
     element: str
 
 
