@@ -174,7 +174,7 @@ def format_key_path(location: Iterable[int | str]) -> str:
 def _format_fault(
     kind: str, location: tuple[int | str, ...], message: str, schema: dict[str, Any]
 ) -> str:
-    if kind == "extra_forbidden":
+    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
         known = _collect_keys(schema, schema, location[:-1])
         return f"unknown key{suggest_spelling(str(location[-1]), known)}"
     if kind == "missing":

@@ -4,8 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Annotated
+
+from pydantic import Field
 
 from drivetwin.errors import InputError
+
+Share = Annotated[float, Field(ge=0, lt=0.5)]
 
 
 @dataclass(frozen=True)
@@ -16,24 +21,23 @@ class Spread:
     gives better ones.
     """
 
-    gain: float = 0.025
+    gain: Share = 0.025
     """Friction gain of each clutch, relative, independent."""
-    engine_torque: float = 0.015
+    engine_torque: Share = 0.015
     """Scale of the engine torque, relative."""
-    contact_pressure: float = 5e3
+    contact_pressure: Annotated[float, Field(ge=0, alias="contact_pressure_Pa")] = 5e3
     """Contact pressure P0 [Pa], common to both clutches."""
-    dead_time: float = 5e-3
+    dead_time: Annotated[Share, Field(alias="dead_time_s")] = 5e-3
     """Dead time of the actuators [s], common to both clutches."""
-    actuator_lag: float = 0.10
+    actuator_lag: Share = 0.10
     """Lags of the actuators, relative, common to both clutches."""
-    kiss_pressure: float = 5e3
+    kiss_pressure: Annotated[float, Field(ge=0, alias="kiss_pressure_Pa")] = 5e3
     """Kiss pressure of each actuator [Pa], independent."""
-    fill_time: float = 0.05
+    fill_time: Share = 0.05
     """Fill time of each actuator, relative, independent."""
-    engine_lag: float = 0.15
+    engine_lag: Share = 0.15
     """Time constant of the engine torque, relative."""
-
-    oil_temperature: float = 5.0
+    oil_temperature: Annotated[float, Field(ge=0, lt=100, alias="oil_temperature_K")] = 5.0
     """Oil temperature of a shift [K], common to both clutches."""
 
     def __post_init__(self) -> None:

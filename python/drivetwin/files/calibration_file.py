@@ -22,7 +22,7 @@ from drivetwin.calibration.operating_map import MapPoint, OperatingMap
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Policy
 from drivetwin.calibration.spread import Spread
-from drivetwin.files.limits_file import SpreadRecord, build_limit_keys
+from drivetwin.files.limits_file import build_limit_keys
 from drivetwin.files.records import Record, SchemaName, read_record
 
 
@@ -128,7 +128,7 @@ class CalibrationFile(Record):
     point: PointRecord
     parameters: dict[str, PolicyValueRecord]
     limits: dict[str, FiniteFloat]
-    spread: SpreadRecord
+    spread: Spread
     settings: dict[str, Any]
     front: list[FrontRecord] = Field(default_factory=list)
     map: list[MapRecord] = Field(default_factory=list)
@@ -189,7 +189,7 @@ def build_calibration_file(
                 for one, value in values
             },
             "limits": {keys[one.metric, one.statistic]: one.bound for one in task.limits},
-            "spread": SpreadRecord.from_result(origin.spread),
+            "spread": origin.spread,
             "settings": {**asdict(task.settings), "options": origin.options},
             "front": build_front_records(front, task.policy),
             "map": build_map_records(mapped),

@@ -42,28 +42,6 @@ def build_limit_keys() -> dict[str, tuple[Metric, Statistic]]:
     return keys
 
 
-class SpreadRecord(Record):
-    """Table `[spread]`: standard deviations between units."""
-
-    gain: FiniteFloat = Field(default=Spread.gain, ge=0, lt=0.5)
-    engine_torque: FiniteFloat = Field(default=Spread.engine_torque, ge=0, lt=0.5)
-    contact_pressure: FiniteFloat = Field(
-        default=Spread.contact_pressure, ge=0, alias="contact_pressure_Pa"
-    )
-    dead_time: FiniteFloat = Field(default=Spread.dead_time, ge=0, lt=0.5, alias="dead_time_s")
-    actuator_lag: FiniteFloat = Field(default=Spread.actuator_lag, ge=0, lt=0.5)
-    kiss_pressure: FiniteFloat = Field(default=Spread.kiss_pressure, ge=0, alias="kiss_pressure_Pa")
-    fill_time: FiniteFloat = Field(default=Spread.fill_time, ge=0, lt=0.5)
-    engine_lag: FiniteFloat = Field(default=Spread.engine_lag, ge=0, lt=0.5)
-    oil_temperature: FiniteFloat = Field(
-        default=Spread.oil_temperature, ge=0, lt=100, alias="oil_temperature_K"
-    )
-
-    def to_spread(self) -> Spread:
-        """Return the spread of the record."""
-        return Spread(**dict(self))
-
-
 class OilRecord(Record):
     """Table `[oil]`: oil temperature of the twin's log, and the friction over the temperature.
 
@@ -89,7 +67,7 @@ class LimitsFile(Record):
     """A file of limits: upper bounds, the spread between units, the oil, bounds of parameters."""
 
     limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]]
-    spread: SpreadRecord = SpreadRecord()
+    spread: Spread = Spread()
     oil: OilRecord = OilRecord()
     bounds: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat]] = Field(default_factory=dict)
 
@@ -132,5 +110,5 @@ def load_limits(path: Path) -> Requirements:
     content = LimitsFile.model_validate(document)
     limits = tuple(Limit(keys[name][0], bound, keys[name][1])
                    for name, bound in content.limits.items())  # fmt: skip
-    drawn = content.spread.to_spread(), content.oil.to_friction()
+    drawn = content.spread, content.oil.to_friction()
     return Requirements(limits, *drawn, content.list_bounds())

@@ -19,7 +19,6 @@ from pydantic import (
     ConfigDict,
     Field,
     FiniteFloat,
-    ValidationInfo,
     model_validator,
 )
 
@@ -53,34 +52,18 @@ def _close_interval(value: object) -> object:
 OptionalInterval = Annotated[Interval | None, BeforeValidator(_close_interval)]
 
 
-_BY_NAME = {"by": "name"}
-"""Context in which a record is built from the attributes of a result."""
-
-
 class Record(BaseModel):
     """Base of all records: closed key set, immutable.
 
     A dataclass whose fields are the keys is its own record; this configuration holds for it too.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     @classmethod
     def from_result(cls, result: object) -> Self:
         """Build the record and those of its parts from the attributes of the fields' names."""
-        return cls.model_validate(result, from_attributes=True, context=_BY_NAME)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_names(cls, source: Any, info: ValidationInfo) -> Any:
-        """Refuse the name of a field whose key in the file is another, such as one with unit."""
-        if isinstance(source, dict) and info.context is not _BY_NAME:
-            for name, one in cls.model_fields.items():
-                if one.alias is not None and name in source:
-                    raise ValueError(f"unknown key {name!r}; write {one.alias!r}")
-        return source
+        return cls.model_validate(result, from_attributes=True, by_alias=True, by_name=True)
 
 
 class FrictionRecord(Record):

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 import tomlkit
-from pydantic import Field, FiniteFloat, field_validator
+from pydantic import Field, FiniteFloat
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
@@ -42,32 +42,12 @@ from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.vehicle_parts import Converter
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from drivetwin.vehicle.card import RATIO_TOLERANCE
-from drivetwin.vehicle.spec import ElementKind
 
 TWIN_SCHEMA = "drivetwin/twin-2"
 _HEADER = (
     "An identified driveline model; written by drivetwin. All values in SI units:",
     "rad, s, N*m, kg*m^2, Pa. A parameter without 'value' could not be determined from the log.",
 )
-
-
-class ElementRecord(Record):
-    """Design data of one shift element (THEORY sections 1 and 2)."""
-
-    kind: ElementKind
-    i_c: FiniteFloat
-    i_out: FiniteFloat
-    gain: FiniteFloat = Field(gt=0, alias="gain_m3")
-    P0: FiniteFloat = Field(alias="P0_Pa")
-    peak: FiniteFloat = Field(ge=1)
-    drum: FiniteFloat = Field(ge=0, alias="drum_inertia_kgm2")
-
-    @field_validator("i_c", "i_out")
-    @classmethod
-    def _reject_zero(cls, ratio: float) -> float:
-        if ratio == 0.0:
-            raise ValueError("a ratio must not be 0")
-        return ratio
 
 
 class ChannelRecord(Record):
@@ -117,7 +97,7 @@ class TransmissionRecord(Record):
     J_prime_range: Interval = Field(alias="J_prime_range_kgm2")
     J_vehicle_range: Interval = Field(alias="J_vehicle_range_kgm2")
     gears: dict[str, TwinGear]
-    elements: dict[str, ElementRecord]
+    elements: dict[str, TwinElement]
     channels: dict[str, ChannelRecord] = Field(default_factory=dict)
     converter: Converter | None = None
 
@@ -256,7 +236,8 @@ _TWIN_FIELDS = (
     *("settings", "assumptions", "actuators"),
 )
 _GEARBOX_FIELDS = (
-    *("i_in", "final_drive", "gears", "J_prime_range", "J_vehicle_range", "converter"),
+    *("i_in", "final_drive", "gears", "elements", "J_prime_range", "J_vehicle_range"),
+    "converter",
 )
 
 
@@ -280,7 +261,6 @@ def build_twin_file(twin: Twin) -> TwinFile:
             "schema": TWIN_SCHEMA,
             "transmission": {
                 **{name: getattr(twin, name) for name in _GEARBOX_FIELDS},
-                "elements": twin.elements,
                 "channels": {
                     role: {**vars(one.spec), "file_unit": one.file_unit}
                     for role, one in twin.mapping.channels.items()
@@ -317,7 +297,6 @@ def restore_twin(content: TwinFile) -> Twin:
         **same
         | design
         | {
-            "elements": {name: TwinElement(**dict(one)) for name, one in gearbox.elements.items()},
             "mapping": RememberedMapping(
                 {role: one.to_channel() for role, one in gearbox.channels.items()},
                 ReadOptions() if content.log is None else content.log.to_options(),

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.rich_display import DisplayMixin
@@ -65,6 +65,15 @@ class TwinGear:
     element: str
 
 
+def _reject_zero(ratio: float) -> float:
+    if ratio == 0.0:
+        raise ValueError("a ratio must not be 0")
+    return ratio
+
+
+ClutchRatio = Annotated[float, AfterValidator(_reject_zero)]
+
+
 @dataclass(frozen=True)
 class TwinElement:
     """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2].
@@ -73,12 +82,12 @@ class TwinElement:
     """
 
     kind: ElementKind
-    i_c: float
-    i_out: float
-    gain: float
-    P0: float
-    peak: float
-    drum: float
+    i_c: ClutchRatio
+    i_out: ClutchRatio
+    gain: Annotated[float, Field(gt=0, alias="gain_m3")]
+    P0: Annotated[float, Field(alias="P0_Pa")]
+    peak: Annotated[float, Field(ge=1)]
+    drum: Annotated[float, Field(ge=0, alias="drum_inertia_kgm2")]
 
     def to_spec(self, name: str) -> ElementSpec:
         """Return the element as on a vehicle card, with all values known."""
