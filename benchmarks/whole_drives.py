@@ -23,9 +23,9 @@ import tomlkit
 
 from drivetwin.channels.units import RPM
 from drivetwin.drive import load_powertrain, plan_all_shift_kinds, run, select_powertrain
+from drivetwin.drive.driver import STEP
 from drivetwin.drive.plan import list_forward_gears
 from drivetwin.drive.result import DriveRun
-from drivetwin.drive.run import STEP
 from drivetwin.gearbox import Gearbox, load_gearbox
 from drivetwin.gearbox.gears import solve_gear
 from drivetwin.simulation.dual_clutch import FloatArray

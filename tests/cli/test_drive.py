@@ -34,6 +34,20 @@ def test_json_carries_shifts_and_energy(capsys: pytest.CaptureFixture[str]) -> N
 def test_what_cannot_be_driven_is_an_error_and_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["drive", "manual-6", "-o", str(tmp_path / "out")]) == 2
-    assert "dogs" in capsys.readouterr().err
+    assert main(["drive", "truck", "-o", str(tmp_path / "out")]) == 2
+    assert "truck" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_manual_gearbox_shows_dogs_and_starting_clutch(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+    assert main(["drive", "manual-6", "--course", "launch", "-o", str(folder)]) == 0
+    text = capsys.readouterr().out
+    for word in ("launch", "1→2", "D1→D2", "dogs", "5→6"):
+        assert word in text
+    assert "torque converter" not in text
+    names = (folder / "drive.csv").read_text().partition("\n")[0].split(",")
+    assert "speed.input shaft" in names
+    assert "pressure.D1" not in names

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.drive.run import FILL, RAMP, ShiftPlan, compute_pressure
 from drivetwin.drive.schedule import Schedule
+from drivetwin.drive.shift_plan import FILL, RAMP, ShiftPlan, compute_pressure
 from drivetwin.gearbox import Gearbox, reduce
 from drivetwin.vehicle.shift_kind import ShiftKind
 

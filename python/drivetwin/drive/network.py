@@ -2,18 +2,17 @@
 """The whole driveline of the paper's Fig. 1 as elements of the core, and its standstill.
 
 Engine map, torque converter with the lock-up clutch beside it, gearbox with the inertias of its
-members, output shaft, final drive, vehicle with service brake.
+members, output shaft, final drive, vehicle with service brake. A gearbox with dogs starts by its
+own clutch: the engine is at its input.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 
 from drivetwin.drive.powertrain import Powertrain
-from drivetwin.errors import InputError
 from drivetwin.gearbox import Drive, Gearbox, build_network_elements, solve_gear
-from drivetwin.gearbox.spec import ElementKind
 from drivetwin.simulation.driveline import (
     CRANK,
     LOAD,
@@ -35,35 +34,34 @@ PEDAL = "pedal"
 
 
 def build_driveline_elements(gearbox: Gearbox, powertrain: Powertrain) -> list[Element]:
-    """Return the elements; inputs are PEDAL, BRAKE and the pressures by element.
+    """Return the elements; inputs are PEDAL, BRAKE, pressures [Pa] and capacities of dogs [N m].
 
-    Raises CardError where the gearbox card has no [drive], InputError where it has dogs, which
-    cannot launch or shift under power, a converter or freewheels.
+    Raises CardError where the gearbox card has no [drive], InputError where it has a converter or
+    freewheels.
     """
     drive = gearbox.require_drive()
     gearbox.require_pressed_alone("a drive")
-    dogs = [e.name for e in gearbox.elements.values() if e.kind is ElementKind.DOG]
-    if dogs:
-        raise InputError(
-            f"{gearbox.name} shifts with dogs ({', '.join(dogs)})",
-            "choose a gearbox whose gears are made by clutches and brakes alone",
-        )
     gearing = build_network_elements(gearbox)
     require_own_nodes(gearing)
     return [
-        *_build_engine(powertrain, drive),
-        *_build_converter(powertrain, gearbox.input),
+        *_build_engine(powertrain, drive, get_crank(gearbox)),
+        *([] if gearbox.dogs else _build_converter(powertrain, gearbox.input)),
         *gearing,
         *_build_vehicle(powertrain, drive, gearbox.output),
     ]
 
 
-def _build_engine(powertrain: Powertrain, drive: Drive) -> list[Element]:
+def get_crank(gearbox: Gearbox) -> str:
+    """Return the node of the crankshaft: the gearbox input where the gearbox has dogs."""
+    return gearbox.input if gearbox.dogs else CRANK
+
+
+def _build_engine(powertrain: Powertrain, drive: Drive, crank: str) -> list[Element]:
     engine = powertrain.engine
     table = {"throttle": [0.0, 1.0], "speed": engine.speed, "torque": [engine.closed, engine.full]}
     return [
-        build_element("inertia", "engine", node=CRANK, inertia=drive.engine_inertia),
-        build_element("engine_map", ENGINE, node=CRANK, throttle=PEDAL, lag=engine.lag, map=table),
+        build_element("inertia", "engine", node=crank, inertia=drive.engine_inertia),
+        build_element("engine_map", ENGINE, node=crank, throttle=PEDAL, lag=engine.lag, map=table),
     ]
 
 
@@ -88,22 +86,25 @@ def _build_vehicle(powertrain: Powertrain, drive: Drive, output: str) -> list[El
 
 
 def build_standstill(gearbox: Gearbox, gear: str, powertrain: Powertrain) -> Start:
-    """Return the vehicle at rest in `gear`, the engine idling against the converter.
+    """Return the vehicle at rest in `gear`, the engine idling.
 
-    The shaft is twisted by what the turbine pulls, else the drive would begin with a jerk.
+    With a converter the shaft is twisted by what the turbine pulls, else the drive would begin with
+    a jerk. In a gearbox with dogs the starting clutch is open.
     """
     idle, statics = powertrain.engine.idle, solve_gear(gearbox, gear)
-    members: Mapping[str, float | None] = statics.speeds
-    speeds = dict.fromkeys(members, 0.0)
-    locked = (*gearbox.get_gear(gear).elements, LOAD, BRAKE)
+    speeds = dict.fromkeys(statics.speeds, 0.0) | {get_crank(gearbox): idle, WHEEL: 0.0}
+    elements = gearbox.get_gear(gear).elements
+    if gearbox.dogs:
+        engaged = [name for name in elements if name in gearbox.dogs]
+        return Start(speeds, {SHAFT: 0.0}, (*engaged, LOAD, BRAKE))
     pull = float(powertrain.converter.compute_turbine_torque(idle, 0.0)) * statics.ratio
     twists = {SHAFT: pull / gearbox.require_drive().shaft_stiffness}
-    return Start(speeds | {CRANK: idle, WHEEL: 0.0}, twists, locked)
+    return Start(speeds, twists, (*elements, LOAD, BRAKE))
 
 
 def list_friction_elements(gearbox: Gearbox) -> tuple[str, ...]:
-    """Names of the lock-up clutch and the gearbox's shift elements."""
-    return (LOCK_UP, *gearbox.elements)
+    """Names of the lock-up clutch, where there is one, and the gearbox's shift elements."""
+    return tuple(gearbox.elements) if gearbox.dogs else (LOCK_UP, *gearbox.elements)
 
 
 def list_outputs(gearbox: Gearbox) -> Sequence[Output]:
@@ -111,14 +112,15 @@ def list_outputs(gearbox: Gearbox) -> Sequence[Output]:
 
     The torques are those of engine, converter, shaft, road, service brake and shift elements.
     """
-    nodes = (CRANK, gearbox.input, gearbox.output, WHEEL)
+    nodes = dict.fromkeys((get_crank(gearbox), gearbox.input, gearbox.output, WHEEL))
     elements = list_friction_elements(gearbox)
+    ports = () if gearbox.dogs else ("pump", "turbine")
     return [
         *(("speed", node) for node in nodes),
         ("shaft_torque", SHAFT),
         *(("slip", name) for name in elements),
         *(("friction_torque", name) for name in (*elements, BRAKE)),
-        *(("torque", f"{CONVERTER}.{port}") for port in ("pump", "turbine")),
+        *(("torque", f"{CONVERTER}.{port}") for port in ports),
         *(("torque", f"{name}.node") for name in (ENGINE, LOAD)),
     ]
 

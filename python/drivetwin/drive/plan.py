@@ -56,7 +56,7 @@ class ShiftTo:
 
 @dataclass(frozen=True)
 class LockUp:
-    """Close the lock-up clutch, or open it."""
+    """Close the lock-up clutch, or open it; in a gearbox with dogs, the starting clutch."""
 
     closed: bool
 
@@ -107,7 +107,8 @@ def list_forward_gears(gearbox: Gearbox) -> tuple[str, ...]:
 def plan_launch(gearbox: Gearbox, control: Control, pedal: float = LAUNCH_PEDAL) -> Plan:
     """From standstill through all gears under power.
 
-    First to second gear with the converter, lock-up in second, the other up-shifts locked up.
+    First to second gear with the converter, lock-up in second, the other up-shifts locked up. A
+    gearbox with dogs launches on its starting clutch.
     Raises InputError for a gearbox of fewer than three forward gears.
     """
     gears = list_forward_gears(gearbox)
@@ -117,10 +118,16 @@ def plan_launch(gearbox: Gearbox, control: Control, pedal: float = LAUNCH_PEDAL)
             "choose a gearbox with three or more, or write the plan yourself",
         )
     ready = Until(Watched.INPUT_SPEED, control.upshift)
-    return (
-        Leg(0.0, Until(Watched.TIME, _STANDING), brake=_HOLD * control.brake),
+    away: Plan = (
         Leg(pedal, Until(Watched.INPUT_SPEED, control.launch_upshift), ShiftTo(gears[1])),
         Leg(pedal, Until(Watched.SPEED_RATIO, control.lock_up_ratio), LockUp(closed=True)),
+    )
+    if gearbox.dogs:
+        start = Until(Watched.INPUT_SPEED, control.downshift)
+        away = (Leg(pedal, start, LockUp(closed=True)), Leg(pedal, ready, ShiftTo(gears[1])))
+    return (
+        Leg(0.0, Until(Watched.TIME, _STANDING), brake=_HOLD * control.brake),
+        *away,
         *(Leg(pedal, ready, ShiftTo(gear)) for gear in gears[2:]),
         Leg(pedal, Until(Watched.TIME, _CRUISE)),
     )
@@ -129,12 +136,14 @@ def plan_launch(gearbox: Gearbox, control: Control, pedal: float = LAUNCH_PEDAL)
 def plan_coast_down(gearbox: Gearbox, control: Control) -> Plan:
     """From the highest gear down to first, pedal closed, with the service brake.
 
-    The lock-up clutch opens in second gear.
+    The lock-up clutch, or the starting clutch of a gearbox with dogs, opens in second gear.
     """
     gears = list_forward_gears(gearbox)
     low = Until(Watched.INPUT_SPEED, control.downshift, falling=True)
     slow = Until(Watched.INPUT_SPEED, control.release, falling=True)
     slower = Until(Watched.INPUT_SPEED, 0.75 * control.release, falling=True)
+    if gearbox.dogs:  # With an open clutch the input is the idling engine.
+        slower = Until(Watched.TIME, _LIFT)
     return (
         *(Leg(0.0, low, ShiftTo(gear), control.brake) for gear in gears[-2:0:-1]),
         Leg(0.0, slow, LockUp(closed=False), control.brake),

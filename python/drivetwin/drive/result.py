@@ -8,7 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.drive.network import BRAKE, CONVERTER, ENGINE, PEDAL, list_friction_elements
+from drivetwin.drive.network import (
+    BRAKE,
+    CONVERTER,
+    ENGINE,
+    PEDAL,
+    get_crank,
+    list_friction_elements,
+)
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.schedule import Schedule
 from drivetwin.gearbox import Gearbox
@@ -24,9 +31,10 @@ _OF_MASS = (0.75, 1.5)
 
 @dataclass(frozen=True)
 class Action:
-    """A shift, or a move of the lock-up clutch, from `start` to `end` [s].
+    """A shift, or a move of lock-up clutch, starting clutch or dogs, from `start` to `end` [s].
 
-    `kind` is one of the four kinds of shift; None where an element is not part of it.
+    `kind` is one of the four kinds of shift, else the device. An element is None where there is
+    none of its side.
     """
 
     label: str
@@ -39,7 +47,8 @@ class Action:
     @property
     def elements(self) -> tuple[str, ...]:
         """The elements that change."""
-        return tuple(name for name in (self.off_going, self.on_coming) if name is not None)
+        named = (self.off_going, self.on_coming)
+        return tuple(dict.fromkeys(name for name in named if name is not None))
 
 
 @dataclass(frozen=True)
@@ -67,13 +76,26 @@ class Maneuver:
 
 
 @dataclass(frozen=True, eq=False)
+class ConverterTraces:
+    """A converter over a drive; arrays (n,).
+
+    `pump_torque` is taken from the engine, `turbine_torque` given to the gearbox [N m].
+    """
+
+    pump_torque: FloatArray
+    turbine_torque: FloatArray
+    speed_ratio: FloatArray
+    torque_ratio: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class DriveRun:
     """A drive; arrays (n,) on `time` [s], SI.
 
     `engine_torque` is that of the lagging map, `brake_torque` that of the service brake,
-    `road_torque` that of the road on the wheel; `speed_ratio` and `torque_ratio` are the
-    converter's, `pump_torque` is what it takes from the engine and `turbine_torque` what it gives
-    to the gearbox; `slip`, `torque`, `pressure` go by element. `work` is the friction work of each
+    `road_torque` that of the road on the wheel. `shaft_speed` goes by member behind a starting
+    clutch; `converter` is None where there is none. `slip` and `torque` go by element, `pressure`
+    by clutch and brake. `work` is the friction work of each
     element over the whole drive [J]. `energy` has works of engine and road, heats and stored
     energies of all other elements [J] on every `TRACE_STEP`th instant: `energy["heat", "shaft"]`.
     `warnings` name elements that slip outside their shifts, and different vehicle inertias of
@@ -90,10 +112,8 @@ class DriveRun:
     pedal: FloatArray
     brake_torque: FloatArray
     road_torque: FloatArray
-    pump_torque: FloatArray
-    speed_ratio: FloatArray
-    torque_ratio: FloatArray
-    turbine_torque: FloatArray
+    shaft_speed: Mapping[str, FloatArray]
+    converter: ConverterTraces | None
     slip: Mapping[str, FloatArray]
     torque: Mapping[str, FloatArray]
     pressure: Mapping[str, FloatArray]
@@ -117,7 +137,7 @@ def build_drive_run(
     time, columns, audit = motion.time, motion.columns, motion.audit
     if audit is None:
         raise ValueError("the motion has not been audited")
-    crank, turbine = columns["speed", CRANK], columns["speed", gearbox.input]
+    crank, turbine = columns["speed", get_crank(gearbox)], columns["speed", gearbox.input]
     elements = list_friction_elements(gearbox)
     slip = {name: columns["slip", name] for name in elements}
     torque = {name: columns["friction_torque", name] for name in elements}
@@ -134,13 +154,13 @@ def build_drive_run(
         pedal=schedule.evaluate(PEDAL, time),
         brake_torque=columns["friction_torque", BRAKE],
         road_torque=columns["torque", f"{LOAD}.node"],
-        pump_torque=-columns["torque", f"{CONVERTER}.pump"],
-        speed_ratio=turbine / crank,
-        torque_ratio=powertrain.converter.compute_torque_ratio(crank, turbine),
-        turbine_torque=columns["torque", f"{CONVERTER}.turbine"],
+        shaft_speed=_compute_shaft_speeds(gearbox, crank, slip),
+        converter=_build_converter_traces(gearbox, powertrain, motion),
         slip=slip,
         torque=torque,
-        pressure={name: schedule.evaluate(name, time) for name in elements},
+        pressure={
+            name: schedule.evaluate(name, time) for name in elements if name not in gearbox.dogs
+        },
         maneuvers=tuple(_build_maneuver(each, motion, power) for each in actions),
         work={name: float(np.trapezoid(power[name], time)) for name in elements},
         energy=energy,
@@ -150,6 +170,34 @@ def build_drive_run(
             *_warn_vehicle_mismatch(gearbox, powertrain),
             *_warn_unwanted_slip(elements, actions, motion.events),
         ),
+    )
+
+
+def _compute_shaft_speeds(
+    gearbox: Gearbox, crank: FloatArray, slip: Mapping[str, FloatArray]
+) -> Mapping[str, FloatArray]:
+    """Speeds (n,) of the members behind the starting clutches of a gearbox with dogs [rad/s]."""
+    found: dict[str, FloatArray] = {}
+    for name, element in gearbox.elements.items():
+        if gearbox.dogs and element.a == gearbox.input:
+            found[element.b] = crank - slip[name]
+        elif gearbox.dogs and element.b == gearbox.input:
+            found[element.a] = crank + slip[name]
+    return found
+
+
+def _build_converter_traces(
+    gearbox: Gearbox, powertrain: Powertrain, motion: NetworkRun
+) -> ConverterTraces | None:
+    if gearbox.dogs:
+        return None
+    columns = motion.columns
+    crank, turbine = columns["speed", CRANK], columns["speed", gearbox.input]
+    return ConverterTraces(
+        pump_torque=-columns["torque", f"{CONVERTER}.pump"],
+        turbine_torque=columns["torque", f"{CONVERTER}.turbine"],
+        speed_ratio=turbine / crank,
+        torque_ratio=powertrain.converter.compute_torque_ratio(crank, turbine),
     )
 
 

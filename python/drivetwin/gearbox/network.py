@@ -13,6 +13,8 @@ from drivetwin.simulation.dual_clutch import FrictionTable
 from drivetwin.simulation.network import Element, build_element
 
 _NO_CAPACITY = Capacity(gain=0.0, P0=0.0, peak=1.0, friction=FrictionTable((0.0,), (0.0,)))
+_DOG = Capacity(gain=1.0, P0=0.0, peak=1.0, friction=FrictionTable((0.0,), (1.0,)))
+"""Unit friction and gain: the input of a dog is its torque capacity [N m]."""
 
 
 def build_network_elements(
@@ -21,8 +23,8 @@ def build_network_elements(
     """Return the gearbox as elements of the core, its members as nodes.
 
     Every clutch and brake has a pressure input [Pa] of its own name, freewheels have none. Dogs
-    that are in `engaged_dogs` become rigid and the others are left out; without it, all stay as
-    elements without capacity, for the study of gears.
+    that are in `engaged_dogs` become rigid and the others are left out. Without it, all stay as
+    friction elements whose inputs are their torque capacities [N m].
     """
     return (
         *_build_gearing(gearbox),
@@ -72,6 +74,7 @@ def _build_shift_elements(
 
 
 def _build_friction(element: ShiftMember) -> Element:
-    capacity = element.capacity or _NO_CAPACITY
+    bare = _DOG if element.kind is ElementKind.DOG else _NO_CAPACITY
+    capacity = element.capacity or bare
     nodes, law = (element.a, element.b), capacity.friction
     return build_clutch(element.name, nodes, law, capacity.gain, capacity.P0, capacity.peak)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from io import StringIO
+from itertools import cycle
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def render_drive(run: DriveRun, title: str) -> str:
             f"{each.action.label}, {each.action.kind}.",
         )
         for each in run.maneuvers
-        if each.action.off_going and each.action.on_coming
+        if each.action.off_going in run.pressure and each.action.on_coming in run.pressure
     ]
     sections = [
         Section("drive", "The drive", "From standstill to the end of the plan.", [motion]),
@@ -91,7 +92,7 @@ def build_energy_table(run: DriveRun) -> TableBlock:
     parts = {
         "engine": audit.source,
         "gain of kinetic and elastic energy": audit.stored,
-        "torque converter": audit.converter,
+        **({} if run.converter is None else {"torque converter": audit.converter}),
         "clutches and brakes of the transmission": elements,
         "service brake and rolling resistance": audit.friction - elements,
         "air and grade": audit.load,
@@ -112,13 +113,11 @@ def format_traces(run: DriveRun) -> str:
         ("wheel_speed", "rad/s"): run.wheel_speed,
         ("engine_torque", "N*m"): run.engine_torque,
         ("pedal", "1"): run.pedal,
-        ("pump_torque", "N*m"): run.pump_torque,
-        ("turbine_torque", "N*m"): run.turbine_torque,
         ("shaft_torque", "N*m"): run.shaft_torque,
         ("brake_torque", "N*m"): run.brake_torque,
         ("road_torque", "N*m"): run.road_torque,
-        ("speed_ratio", "1"): run.speed_ratio,
-        ("torque_ratio", "1"): run.torque_ratio,
+        **_list_converter_columns(run),
+        **{(f"speed.{name}", "rad/s"): values for name, values in run.shaft_speed.items()},
         **{(make_pressure_role(name), "Pa"): values for name, values in run.pressure.items()},
         **{(f"slip.{name}", "rad/s"): values for name, values in run.slip.items()},
         **{(f"torque.{name}", "N*m"): values for name, values in run.torque.items()},
@@ -135,6 +134,18 @@ def format_traces(run: DriveRun) -> str:
     return text.getvalue()
 
 
+def _list_converter_columns(run: DriveRun) -> Mapping[tuple[str, str], FloatArray]:
+    """Traces of the converter by name and unit; none without a converter."""
+    if run.converter is None:
+        return {}
+    return {
+        ("pump_torque", "N*m"): run.converter.pump_torque,
+        ("turbine_torque", "N*m"): run.converter.turbine_torque,
+        ("speed_ratio", "1"): run.converter.speed_ratio,
+        ("torque_ratio", "1"): run.converter.torque_ratio,
+    }
+
+
 _COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 _RATIO = Display("–")
 _BEFORE, _AFTER = 0.1, 0.6
@@ -143,19 +154,18 @@ _BEFORE, _AFTER = 0.1, 0.6
 
 def plot_motion(run: DriveRun) -> Figure:
     """Speeds, torques, converter and pressures over the whole drive."""
-    time = run.time
+    time, converter = run.time, run.converter
+    ratios = [Curve("pedal", time, run.pedal, MUTED, dash="dot")]
+    if converter is not None:
+        ratios = [
+            Curve("speed ratio", time, converter.speed_ratio, MEASURED),
+            Curve("torque ratio", time, converter.torque_ratio, SIMULATED),
+            *ratios,
+        ]
     panels = [
         Panel("speed", RPM, _build_speed_curves(run, slice(None)), weight=1.3),
         Panel("torque", NM, _build_torque_curves(run, slice(None)), weight=1.3),
-        Panel(
-            "converter",
-            _RATIO,
-            [
-                Curve("speed ratio", time, run.speed_ratio, MEASURED),
-                Curve("torque ratio", time, run.torque_ratio, SIMULATED),
-                Curve("pedal", time, run.pedal, MUTED, dash="dot"),
-            ],
-        ),
+        Panel("pedal" if converter is None else "converter", _RATIO, ratios),
         Panel(
             "pressure", BAR, _build_element_curves(run.pressure, time, slice(None), run.pressure)
         ),
@@ -164,16 +174,23 @@ def plot_motion(run: DriveRun) -> Figure:
 
 
 def plot_maneuver(run: DriveRun, maneuver: Maneuver) -> Figure:
-    """One shift: input speed, output torque, pressures and friction power of both elements."""
+    """One shift: input speed, output torque, pressures, friction power of all that slips in it."""
     action = maneuver.action
     first, last = np.searchsorted(run.time, (action.start - _BEFORE, action.end + _AFTER))
     inside = slice(int(first), int(last))
     time = run.time[inside]
-    power = {name: run.slip[name] * run.torque[name] for name in action.elements}
+    meanwhile = [
+        name
+        for each in run.maneuvers
+        if action.start <= each.action.start < action.end
+        for name in each.action.elements
+    ]
+    power = {name: run.slip[name] * run.torque[name] for name in (*action.elements, *meanwhile)}
+    pressed = [name for name in action.elements if name in run.pressure]
     panels = [
-        Panel("speed", RPM, _build_speed_curves(run, inside)[:2]),
+        Panel("speed", RPM, _build_speed_curves(run, inside)[:-1]),
         Panel("torque", NM, _build_torque_curves(run, inside)),
-        Panel("pressure", BAR, _build_element_curves(run.pressure, time, inside, action.elements)),
+        Panel("pressure", BAR, _build_element_curves(run.pressure, time, inside, pressed)),
         Panel("power", Display("kW", 1e-3), _build_element_curves(power, time, inside, power)),
     ]
     return plot_over_time_axis(panels, compute_full_range(panels), 560)
@@ -181,7 +198,8 @@ def plot_maneuver(run: DriveRun, maneuver: Maneuver) -> Figure:
 
 def plot_energy(run: DriveRun) -> Figure:
     """Friction work by element and converter heat as bars."""
-    parts = {"torque converter": run.audit.converter, **run.work}
+    heat = {} if run.converter is None else {"torque converter": run.audit.converter}
+    parts = {**heat, **run.work}
     figure = Figure(
         make_trace(
             "bar",
@@ -199,9 +217,13 @@ def plot_energy(run: DriveRun) -> Figure:
 
 def _build_speed_curves(run: DriveRun, inside: slice) -> list[Curve]:
     time = run.time[inside]
+    shafts = run.shaft_speed or {"gearbox input": run.input_speed}
     return [
         Curve("engine", time, run.engine_speed[inside], MEASURED),
-        Curve("gearbox input", time, run.input_speed[inside], SIMULATED),
+        *(
+            Curve(name, time, values[inside], colour)
+            for (name, values), colour in zip(shafts.items(), cycle(_COLOURS[1:]), strict=False)
+        ),
         Curve("gearbox output", time, run.output_speed[inside], COMPARED),
     ]
 

@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: MIT
+"""Drives of gearboxes with dogs: manual, automated manual, dual clutch.
+
+A starting clutch connects the engine to the gearbox. Each dog has a synchroniser: a friction cone
+that brings the free members to the speed of the new gear, after which the dog engages without slip.
+A change of gear on the same clutch interrupts the torque: clutch opens, neutral, synchronised,
+clutch closes. Between two clutches the dogs of the new gear are engaged beforehand, and the torque
+goes over as in any shift from one element to another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+
+import numpy as np
+
+from drivetwin.drive.driver import LONGEST_SHIFT, PEDAL_RAMP, STEP, Driver, State
+from drivetwin.drive.network import BRAKE, PEDAL
+from drivetwin.drive.plan import LONGEST_LEG, Leg, ShiftTo, Watched, list_forward_gears
+from drivetwin.drive.powertrain import Powertrain
+from drivetwin.drive.result import Action
+from drivetwin.drive.schedule import Schedule
+from drivetwin.drive.shift_plan import CLOSE, FILL, MARGIN, OPEN, RAMP, compute_pressure
+from drivetwin.errors import CardError, InputError, SimulationError
+from drivetwin.gearbox import Gearbox
+from drivetwin.gearbox.spec import GROUND
+from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network import Output
+from drivetwin.vehicle.shift_kind import ShiftKind
+
+ENGAGED = 1e6
+"""Torque capacity of an engaged dog, N m: above that of any road vehicle, since teeth hold."""
+
+
+@dataclass(frozen=True)
+class DogGear:
+    """Starting clutch and dogs of a gear."""
+
+    clutch: str
+    dogs: tuple[str, ...]
+
+
+def split_gear(gearbox: Gearbox, gear: str) -> DogGear:
+    """Return the starting clutch and the dogs of a gear.
+
+    Raises InputError where the gear has other elements, or not one clutch at the gearbox input.
+    """
+    names = gearbox.get_gear(gear).elements
+    others = [name for name in names if name not in gearbox.dogs]
+    ends = [{gearbox.elements[name].a, gearbox.elements[name].b} for name in others]
+    if len(others) != 1 or gearbox.input not in ends[0]:
+        raise InputError(
+            f"gear {gear} of {gearbox.name} has dogs and is made by {', '.join(names)}",
+            f"a gearbox with dogs drives where each gear has one clutch at {gearbox.input!r} and "
+            "dogs alone; build another one as a network with drivetwin.Model",
+        )
+    return DogGear(others[0], tuple(name for name in names if name in gearbox.dogs))
+
+
+def compute_synchronised_inertia(gearbox: Gearbox, dog: str, engaged: Sequence[str]) -> float:
+    """Inertia that a synchroniser brings to speed, per slip of its dog [kg m^2].
+
+    The output is held, elements in `engaged` turn rigidly, all clutches are open: J = 1/(c·M⁻¹·c)
+    on the free motions, with c the slip of the dog in them. The spin of planets is left out.
+    Raises CardError where a member that moves has no inertia.
+    """
+    rows: list[dict[str, float]] = [_get_slip(gearbox, dog), {gearbox.output: 1.0}]
+    rows += [{pair.a: 1.0, pair.b: -pair.ratio} for pair in gearbox.pairs]
+    rows += [{s.sun: 1.0, s.ring: s.z, s.carrier: -1.0 - s.z} for s in gearbox.sets]
+    rows += [_get_slip(gearbox, name) for name in engaged]
+    members = [name for name in dict.fromkeys(key for row in rows for key in row) if name != GROUND]
+    slip, *constraints = np.array([[row.get(name, 0.0) for name in members] for row in rows])
+    _, sizes, turns = np.linalg.svd(np.array(constraints))
+    free = turns[int(np.sum(sizes > _ROUND_OFF * sizes[0])) :].T
+    inertias = np.array([gearbox.inertias.get(name, 0.0) for name in members])
+    mass = free.T @ (inertias[:, None] * free)
+    moved = free.T @ slip
+    if not np.abs(moved).max(initial=0.0) > _ROUND_OFF:
+        return 0.0
+    if np.linalg.matrix_rank(mass, hermitian=True) < len(mass):
+        raise CardError(
+            f"a member that the synchroniser of {dog} turns has no inertia",
+            "give [inertia_kgm2] of all members of the gearbox card",
+        )
+    return 1.0 / float(moved @ np.linalg.solve(mass, moved))
+
+
+_ROUND_OFF = 1e-12
+"""Relative size of a singular value that counts as none."""
+
+
+def _get_slip(gearbox: Gearbox, name: str) -> dict[str, float]:
+    """Slip of a shift element as coefficients of the speeds of its members."""
+    element = gearbox.elements[name]
+    return {element.a: 1.0, element.b: -1.0}
+
+
+class DogDriver(Driver):
+    """Decisions on a gearbox with dogs."""
+
+    def __init__(self, gearbox: Gearbox, powertrain: Powertrain) -> None:
+        self.gears = {gear: split_gear(gearbox, gear) for gear in list_forward_gears(gearbox)}
+        super().__init__(gearbox, powertrain)
+        drive = gearbox.require_drive()
+        self.phase = drive.inertia_phase
+        self.engine_inertia = drive.engine_inertia + gearbox.inertias.get(gearbox.input, 0.0)
+
+    def start_drive(self, leg: Leg) -> State:
+        """Standstill in the lowest gear with open clutches and the first leg's pedal and brake."""
+        first = self.gears[self.first]
+        levels = dict.fromkeys(self.gearbox.elements, OPEN)
+        levels |= dict.fromkeys(first.dogs, ENGAGED)
+        levels |= {first.clutch: self._get_touch(first.clutch)}
+        levels |= {PEDAL: leg.pedal, BRAKE: leg.brake}
+        schedule = Schedule({name: ((0.0, value),) for name, value in levels.items()})
+        return State(0.0, self.first, False, schedule, dogs=first.dogs)
+
+    def compute_watched(
+        self, what: Watched, elapsed: FloatArray, motion: Mapping[Output, FloatArray]
+    ) -> FloatArray:
+        """Values (n,) of a watched quantity; raises InputError for the ratio of a converter."""
+        if what is Watched.SPEED_RATIO:
+            raise InputError(
+                f"a leg of {self.gearbox.name} ends at a speed ratio, and there is no converter",
+                "end the leg at an input speed or a time",
+            )
+        return super().compute_watched(what, elapsed, motion)
+
+    def prepare_leg(self, leg: Leg, state: State) -> State:
+        """Release the dogs of the gear before; engage those of a next gear on another clutch."""
+        here = self.gears[state.gear]
+        wanted = here.dogs
+        if state.locked_up and isinstance(leg.then, ShiftTo):
+            after = self._get_gear(leg.then.gear)
+            wanted += () if after.clutch == here.clutch else after.dogs
+        return self._change_dogs(state, state.time, wanted)
+
+    def _get_gear(self, name: str) -> DogGear:
+        if name not in self.gears:
+            raise InputError(
+                f"{name!r} is not a forward gear of {self.gearbox.name}",
+                f"choose one of {', '.join(self.gears)}",
+            )
+        return self.gears[name]
+
+    def run_shift(
+        self, gear: str, leg: Leg, state: State, start: float, now: Mapping[Output, float]
+    ) -> State:
+        """Shift from clutch to clutch, or with interrupted torque on the same clutch."""
+        old, new = self.gears[state.gear], self._get_gear(gear)
+        if start < state.ready:
+            start, now = state.ready, self._look(state.schedule, state.ready)
+        if not state.locked_up:
+            state = self._change_dogs(state, start, new.dogs)
+            return replace(state, time=max(start, state.ready), gear=gear)
+        if old.clutch != new.clutch:
+            return super().run_shift(gear, leg, state, start, now)
+        return self._interrupt(gear, leg, state, start, now)
+
+    def _interrupt(
+        self, gear: str, leg: Leg, state: State, start: float, now: Mapping[Output, float]
+    ) -> State:
+        """Change gear on one clutch: it opens, the dogs change, it closes."""
+        old, new = self.gears[state.gear], self.gears[gear]
+        schedule = state.schedule.add_knots(PEDAL, start, (FILL, 0.0))
+        schedule = schedule.add_knots(old.clutch, start, (FILL, self._get_touch(old.clutch)))
+        opened = self._change_dogs(replace(state, schedule=schedule), start + FILL, new.dogs)
+        at = opened.ready
+        slip = self._look(opened.schedule, at)["slip", new.clutch] * self._get_sense(new.clutch)
+        torque = self._compute_torque(leg.pedal, now["speed", self.crank])
+        swing = self.engine_inertia * abs(slip) / self.phase
+        carried = max(0.0, float(np.sign(slip)) * torque + swing)
+        schedule = opened.schedule.add_knots(PEDAL, at, (PEDAL_RAMP, leg.pedal))
+        schedule, done = self._close(schedule, at, new.clutch, leg.pedal, carried)
+        ratios = [self.gearbox.get_gear(name).published for name in (state.gear, gear)]
+        kind = ShiftKind.from_direction(up=ratios[1] < ratios[0], power_on=torque > 0.0)
+        label = f"{state.gear}→{gear}"
+        action = Action(label, kind, start, done, old.clutch, new.clutch)
+        begun = len(state.actions)
+        actions = (*state.actions, action, *opened.actions[begun:])
+        return replace(opened, time=done, gear=gear, schedule=schedule, actions=actions)
+
+    def run_lock_up(
+        self, closed: bool, leg: Leg, state: State, start: float, now: Mapping[Output, float]
+    ) -> State:
+        """Launch on the starting clutch of the gear, or open it."""
+        clutch, schedule = self.gears[state.gear].clutch, state.schedule
+        if closed:
+            torque = self._compute_torque(leg.pedal, now["speed", self.crank])
+            schedule, done = self._close(
+                schedule, start, clutch, leg.pedal, MARGIN * max(0.0, torque), LONGEST_LEG
+            )
+            action = Action("launch", "clutch", start, done, None, clutch)
+        else:
+            done = start + CLOSE
+            schedule = schedule.add_knots(clutch, start, (CLOSE, self._get_touch(clutch)))
+            action = Action("release", "clutch", start, done, clutch, None)
+        actions = (*state.actions, action)
+        return replace(state, time=done, locked_up=closed, schedule=schedule, actions=actions)
+
+    def _close(
+        self,
+        schedule: Schedule,
+        start: float,
+        clutch: str,
+        pedal: float,
+        torque: float,
+        longest: float = LONGEST_SHIFT,
+    ) -> tuple[Schedule, float]:
+        """Slip a starting clutch with a torque [N m] until it is synchronous, then close it.
+
+        Return the inputs and the time at which it is closed [s].
+        """
+        capacity = self.gearbox.get_capacity(clutch)
+        slip = self._look(schedule, start)["slip", clutch]
+        level = compute_pressure(capacity, torque, abs(slip))
+        schedule = schedule.add_knots(clutch, start, (RAMP, level))
+        side = float(np.sign(slip))
+        synchronous = self.find_synchronism(schedule, start, (clutch, side), longest)
+        if synchronous is None:
+            raise SimulationError(
+                f"the clutch {clutch} closed from {start:.2f} s on still slips after {longest:g} s",
+                "use more pedal, or a powertrain that suits the gearbox and the load",
+            )
+        speed = self._look(schedule, synchronous)["speed", self.crank]
+        holding = MARGIN * abs(self._compute_torque(pedal, speed))
+        enough = max(level, compute_pressure(capacity, holding, 0.0))
+        points = (RAMP, enough), (RAMP + CLOSE, max(self.powertrain.control.main, enough))
+        return schedule.add_knots(clutch, synchronous, *points), synchronous + points[-1][0]
+
+    def _compute_torque(self, pedal: float, speed: float) -> float:
+        return float(self.powertrain.engine.compute_steady_torque(pedal, speed))
+
+    def _get_touch(self, clutch: str) -> float:
+        """Pressure at which a starting clutch touches without torque [Pa]."""
+        return self.gearbox.get_capacity(clutch).P0
+
+    def _get_sense(self, clutch: str) -> float:
+        """Return 1 where the slip of a clutch is that of the engine over the gearbox, else -1."""
+        return 1.0 if self.gearbox.elements[clutch].a == self.gearbox.input else -1.0
+
+    def _change_dogs(self, state: State, start: float, wanted: Sequence[str]) -> State:
+        """Release the dogs that are not wanted at `start` [s], synchronise and engage the others.
+
+        The synchroniser has the torque that ends the slip within the inertia phase, and that keeps
+        up with the acceleration of the vehicle.
+        """
+        off = [name for name in state.dogs if name not in wanted]
+        on = [name for name in wanted if name not in state.dogs]
+        schedule, done = state.schedule, start
+        for name in off:
+            schedule = schedule.add_knots(name, start, (RAMP, OPEN))
+        if off:
+            done = start + RAMP
+        held = [name for name in state.dogs if name in wanted]
+        for name in on:
+            schedule, done = self._synchronise(schedule, done, name, held)
+            held.append(name)
+        actions = tuple(
+            Action(_describe_change(old, new), "dogs", start, done, old, new)
+            for old, new in zip_longest(off, on)
+        )
+        return replace(
+            state,
+            schedule=schedule,
+            dogs=tuple(held),
+            ready=done,
+            actions=(*state.actions, *actions),
+        )
+
+    def _synchronise(
+        self, schedule: Schedule, start: float, dog: str, engaged: Sequence[str]
+    ) -> tuple[Schedule, float]:
+        """Engage a dog from `start` [s] on; return the inputs and the time it is engaged."""
+        now, after = (self._look(schedule, at)["slip", dog] for at in (start, start + STEP))
+        inertia = compute_synchronised_inertia(self.gearbox, dog, engaged)
+        growth = max(0.0, (abs(after) - abs(now)) / STEP)
+        level = MARGIN * inertia * (abs(now) / self.phase + growth)
+        schedule = schedule.add_knots(dog, start, (RAMP, level))
+        synchronous = self.find_synchronism(schedule, start, (dog, float(np.sign(now))))
+        if synchronous is None:
+            raise SimulationError(
+                f"the synchroniser of {dog} does not reach synchronism at {start:.2f} s: a dog "
+                "engages without slip alone",
+                "change gear at another speed, and state the inertias of all members",
+            )
+        return schedule.add_knots(dog, synchronous, (RAMP, ENGAGED)), synchronous + RAMP
+
+    def _look(self, schedule: Schedule, time: float) -> Mapping[Output, float]:
+        """Return the motion at one instant [s]."""
+        _, motion = self.simulate_ahead(schedule, time, 0.0)
+        return {key: float(column[0]) for key, column in motion.items()}
+
+
+def _describe_change(old: str | None, new: str | None) -> str:
+    if old is None or new is None:
+        return f"release {old}" if new is None else f"engage {new}"
+    return f"{old}→{new}"
