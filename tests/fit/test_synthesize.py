@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -60,7 +61,7 @@ def test_equal_seeds_give_equal_logs_and_noise_has_the_stated_size() -> None:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_column_is_written_as_its_channel_reads_it(sign: int, tmp_path: Path) -> None:
+def test_a_column_is_written_as_its_channel_reads_it(sign: Literal[1, -1], tmp_path: Path) -> None:
     model, channels = read_builtin(ModelName.TIP_IN)
     plain = read(tmp_path, model, channels)
     spec = channels.outputs["motor speed"]

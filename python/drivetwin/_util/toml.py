@@ -9,9 +9,10 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from drivetwin._util.regular_file import measure_regular_file
 from drivetwin.errors import InputError, Where, suggest_spelling
@@ -34,6 +35,20 @@ class StrictModel(BaseModel):
     """A table of a file: unknown keys, wrong types, infinities and NaN are faults."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class FromTable:
+    """Annotation of a frozen dataclass in SI as a table of a file.
+
+    Its fields, or their aliases, are the keys; their annotations state limits and units.
+    """
+
+    @staticmethod
+    def __get_pydantic_core_schema__(source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the schema of the dataclass, which in a strict model would take no dictionary."""
+        schema = handler(source)
+        cast("dict[str, Any]", handler.resolve_ref_schema(schema))["strict"] = False
+        return schema
 
 
 class WrittenNumber(float):

@@ -9,8 +9,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import AfterValidator, Field
 from scipy.constants import bar
 
 from drivetwin._native import actuator_pressure
@@ -95,6 +97,15 @@ QUANTITIES: Mapping[str, ActuatorQuantity] = {
 """Parameters of the model, in the order of covariances and tables."""
 
 
+def _limit(name: str, key: str, unit: float = 1.0) -> Any:
+    """Annotate a parameter with its key on a card, and its limits in a unit of this size in SI."""
+    one = QUANTITIES[name]
+    return Field(alias=key, ge=one.lower / unit, le=one.upper / unit)
+
+
+IN_BAR = AfterValidator(bar.__mul__)
+
+
 @dataclass(frozen=True)
 class ActuatorModel:
     """Commanded pressure to clutch pressure; see `QUANTITIES` for the fields (SI).
@@ -103,13 +114,13 @@ class ActuatorModel:
     this order. Raises InputError for a value outside its bounds.
     """
 
-    dead_time: float
-    rising_lag: float
-    falling_lag: float
-    damping: float = 1.0
-    kiss_pressure: float = 0.0
-    fill_time: float = 0.0
-    hysteresis: float = 0.0
+    dead_time: Annotated[float, _limit("dead_time", "dead_time_s")]
+    rising_lag: Annotated[float, _limit("rising_lag", "rising_lag_s")]
+    falling_lag: Annotated[float, _limit("falling_lag", "falling_lag_s")]
+    damping: Annotated[float, _limit("damping", "damping")] = 1.0
+    kiss_pressure: Annotated[float, _limit("kiss_pressure", "kiss_pressure_bar", bar), IN_BAR] = 0.0
+    fill_time: Annotated[float, _limit("fill_time", "fill_time_s")] = 0.0
+    hysteresis: Annotated[float, _limit("hysteresis", "hysteresis_bar", bar), IN_BAR] = 0.0
 
     def __post_init__(self) -> None:
         for one in fields(self):

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Generic, Literal, TypeVar
+from typing import Annotated, Generic, TypeVar
 
 from pydantic import Field
 
-from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
+from drivetwin._util.toml import FromTable, StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.names import normalise_name
 from drivetwin.channels.read_options import BusOptions, ChannelSpec, ReadOptions, TimeColumn
@@ -66,35 +66,8 @@ class ByRole(StrictModel, Generic[Entry]):
                 yield f"{kind}.{place}", entry
 
 
-class ChannelTable(StrictModel):
-    """`[channels.<role>]`: see ChannelSpec for the meaning of each key."""
-
-    source: str = Field(min_length=1)
-    group: str | None = None
-    unit: str | None = None
-    sign: Literal[1, -1] = 1
-    scale: float = Field(default=1.0, gt=0)
-    offset: float = 0.0
-    time_shift_s: float = 0.0
-
-    def to_spec(self) -> ChannelSpec:
-        """Return the table as the mapping uses it."""
-        values = dict(self)
-        return ChannelSpec(time_shift=values.pop("time_shift_s"), **values)
-
-    @classmethod
-    def from_spec(cls, spec: ChannelSpec) -> ChannelTable:
-        """Return the table of a channel of a mapping."""
-        values = dict(vars(spec))
-        return cls(time_shift_s=values.pop("time_shift"), **values)
-
-
-class TimeTable(StrictModel):
-    """`[time]`: what cannot be found in the file about its time column and its rows."""
-
-    source: str | None = None
-    unit: str | None = None
-    simultaneous: bool = False
+ChannelTable = Annotated[ChannelSpec, FromTable]
+"""`[channels.<role>]`."""
 
 
 class BusTable(StrictModel):
@@ -113,7 +86,7 @@ class ColumnsTable(StrictModel):
 class MappingFile(StrictModel):
     """A channel mapping file."""
 
-    time: TimeTable = TimeTable()
+    time: Annotated[TimeColumn, FromTable] = TimeColumn()
     bus: BusTable = BusTable()
     columns: ColumnsTable = ColumnsTable()
     channels: ByRole[ChannelTable] = ByRole[ChannelTable]()
@@ -156,15 +129,13 @@ def read_mapping(path: Path) -> Mapped:
         "correct the channel mapping file; 'drivetwin inspect --write-mapping' writes a valid one",
     )
     file = MappingFile.model_validate(document)
-    channels = {role: table.to_spec() for role, table in file.channels.iterate_roles()}
     bus = BusOptions(
         tuple(path.parent / name for name in file.bus.dbc), file.bus.reference_torque_Nm
     )
-    time = TimeColumn(file.time.source, file.time.unit, file.time.simultaneous)
     names = dict(file.names.iterate_roles())
     _refuse_blank_names(names, path)
-    options = ReadOptions(time, bus, tuple(file.columns.ignored))
-    return Mapped(channels, options, names=names, file=path)
+    options = ReadOptions(file.time, bus, tuple(file.columns.ignored))
+    return Mapped(dict(file.channels.iterate_roles()), options, names=names, file=path)
 
 
 def _refuse_blank_names(names: Mapping[str, list[str]], path: Path) -> None:

@@ -6,6 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 
 @dataclass(frozen=True)
@@ -73,12 +76,12 @@ class ChannelSpec:
     the time stamps. `group` chooses among columns of one name (None: the name is unique).
     """
 
-    source: str
+    source: Annotated[str, Field(min_length=1)]
     unit: str | None = None
-    sign: int = 1
-    scale: float = 1.0
+    sign: Literal[1, -1] = 1
+    scale: Annotated[float, Field(gt=0)] = 1.0
     offset: float = 0.0
-    time_shift: float = 0.0
+    time_shift: Annotated[float, Field(alias="time_shift_s")] = 0.0
     group: str | None = None
 
     def matches(self, column: Column) -> bool:

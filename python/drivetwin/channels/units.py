@@ -12,10 +12,11 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import AfterValidator
 
 from drivetwin.channels.roles import Quantity, get_quantity
 from drivetwin.channels.shiftlog import FloatArray
@@ -25,6 +26,8 @@ BAR = 1e5
 """One bar [Pa]."""
 RPM = math.pi / 30.0
 """One revolution per minute [rad/s]."""
+IN_RPM, IN_BAR = AfterValidator(RPM.__mul__), AfterValidator(BAR.__mul__)
+"""Units of the keys of a file as annotations of fields in SI."""
 _REV = 2.0 * math.pi
 DEG = math.pi / 180.0
 _PSI = 6894.757293168361
@@ -32,22 +35,6 @@ _FT_LB = 1.3558179483314004
 _KGF = 9.80665
 _INCH = 0.0254
 _LBF = 0.45359237 * _KGF
-
-
-_SUFFIXES = {
-    "_bar": BAR, "_rpm": RPM, "_ms": 1e-3, "_Nm_rad": 1.0, "_Nms_rad": 1.0,
-    "_s": 1.0, "_Nm": 1.0, "_kgm2": 1.0,
-}  # fmt: skip
-"""Sizes in SI of the units that end the keys of a file; longer endings first."""
-
-
-def convert_table(table: Iterable[tuple[str, float]]) -> dict[str, float]:
-    """Return the numbers of a table in SI, by their keys without the unit at the end."""
-    found = {}
-    for key, value in table:
-        suffix = next((one for one in _SUFFIXES if key.endswith(one)), "")
-        found[key.removesuffix(suffix)] = value * _SUFFIXES.get(suffix, 1.0)
-    return found
 
 
 @dataclass(frozen=True)

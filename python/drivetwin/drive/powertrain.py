@@ -15,8 +15,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
-from drivetwin.channels.units import BAR, RPM, convert_table
+from drivetwin._util.toml import FromTable, StrictModel, raise_faults, read_toml, validate_schema
+from drivetwin.channels.units import BAR, IN_BAR, IN_RPM, RPM
 from drivetwin.errors import CardError, suggest_spelling
 from drivetwin.gearbox import Gearbox
 from drivetwin.gearbox.spec import Capacity
@@ -50,7 +50,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class Control:
-    """When the transmission acts.
+    """`[control]`: when the transmission acts.
 
     Speeds of the gearbox input [rad/s]: `upshift`, `downshift` with the lock-up clutch closed,
     `launch_upshift` from first gear with the converter, `release` of the lock-up clutch in
@@ -58,13 +58,13 @@ class Control:
     pressure of a closed element [Pa], `brake` the service brake of a coast-down [N m at the wheel].
     """
 
-    upshift: float
-    downshift: float
-    launch_upshift: float
-    release: float
-    lock_up_ratio: float
-    main: float
-    brake: float
+    upshift: Annotated[float, Field(gt=0, alias="upshift_rpm"), IN_RPM]
+    downshift: Annotated[float, Field(gt=0, alias="downshift_rpm"), IN_RPM]
+    launch_upshift: Annotated[float, Field(gt=0, alias="launch_upshift_rpm"), IN_RPM]
+    release: Annotated[float, Field(gt=0, alias="release_rpm"), IN_RPM]
+    lock_up_ratio: Annotated[float, Field(gt=0, lt=1)]
+    main: Annotated[float, Field(gt=0, alias="main_bar"), IN_BAR]
+    brake: Annotated[float, Field(ge=0, alias="brake_Nm")]
 
 
 @dataclass(frozen=True)
@@ -179,22 +179,6 @@ class RoadTable(StrictModel):
         )
 
 
-class ControlTable(StrictModel):
-    """`[control]`: when the transmission acts, its main pressure, the brake of a coast-down."""
-
-    upshift_rpm: Positive
-    downshift_rpm: Positive
-    launch_upshift_rpm: Positive
-    release_rpm: Positive
-    lock_up_ratio: Annotated[float, Field(gt=0, lt=1)]
-    main_bar: Positive
-    brake_Nm: Annotated[float, Field(ge=0)]
-
-    def to_spec(self) -> Control:
-        """Return the thresholds in SI."""
-        return Control(**convert_table(self))
-
-
 class PowertrainFile(StrictModel):
     """A powertrain file."""
 
@@ -204,7 +188,7 @@ class PowertrainFile(StrictModel):
     converter: ConverterTable
     lock_up: LockUpTable
     road: RoadTable
-    control: ControlTable
+    control: Annotated[Control, FromTable]
 
     def to_spec(self) -> Powertrain:
         """Return the powertrain in SI."""
@@ -216,7 +200,7 @@ class PowertrainFile(StrictModel):
             lock_up=self.lock_up.to_spec(),
             road=self.road.to_spec(),
             mass_inertia=self.road.mass_kg * self.road.radius_m**2,
-            control=self.control.to_spec(),
+            control=self.control,
         )
 
 

@@ -12,8 +12,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from drivetwin._util.toml import Fault, StrictModel, raise_faults, read_toml, validate_schema
-from drivetwin.channels.units import BAR, convert_table
+from drivetwin._util.toml import (
+    Fault,
+    FromTable,
+    StrictModel,
+    raise_faults,
+    read_toml,
+    validate_schema,
+)
+from drivetwin.channels.units import BAR
 from drivetwin.errors import CardError, suggest_spelling
 from drivetwin.gearbox.spec import (
     CONVERTER,
@@ -203,26 +210,6 @@ class GearTable(StrictModel):
         return GearEntry(self.name, tuple(self.elements), overall, rounding)
 
 
-class DriveTable(StrictModel):
-    """`[drive]`: engine, output shaft, vehicle around the gearbox; the pace of its shifts."""
-
-    engine_inertia_kgm2: float = Field(gt=0)
-    engine_torque_Nm: float = Field(gt=0)
-    overrun_torque_Nm: float = Field(lt=0)
-    engine_speed_rpm: float = Field(gt=0)
-    final_drive: float = Field(gt=0)
-    vehicle_inertia_kgm2: float = Field(gt=0)
-    shaft_stiffness_Nm_rad: float = Field(gt=0)
-    shaft_damping_Nms_rad: float = Field(ge=0)
-    load_torque_Nm: float = 0.0
-    torque_phase_s: float = Field(default=0.15, gt=0)
-    inertia_phase_s: float = Field(default=0.35, gt=0)
-
-    def to_spec(self) -> Drive:
-        """Return the drive in SI."""
-        return Drive(**convert_table(self))
-
-
 class ConverterStageTable(ConverterTable):
     """`[converter]`: the map of a torque converter and its members; the turbine is the input."""
 
@@ -247,7 +234,7 @@ class GearboxFile(StrictModel):
     gears: list[GearTable] = Field(min_length=1)
     inertia_kgm2: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
     friction: FrictionEntry | None = None
-    drive: DriveTable | None = None
+    drive: Annotated[Drive, FromTable] | None = None
     converter: ConverterStageTable | None = None
 
     @field_validator("input", "output", mode="before")
@@ -405,6 +392,6 @@ def build_gearbox(document: Mapping[str, Any]) -> Gearbox:
         gears=tuple(gear.to_spec() for gear in file.gears),
         inertias=dict(file.inertia_kgm2),
         source=file.source,
-        drive=None if file.drive is None else file.drive.to_spec(),
+        drive=file.drive,
         converter=None if file.converter is None else file.converter.to_stage(),
     )

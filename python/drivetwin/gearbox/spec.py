@@ -9,9 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
+from drivetwin.channels.units import IN_RPM
 from drivetwin.errors import CardError, InputError, ReductionError, suggest_spelling
 from drivetwin.simulation.driveline import OutputSide
 from drivetwin.simulation.dual_clutch import FrictionTable, RoadLoad, Stribeck
@@ -20,7 +23,7 @@ from drivetwin.simulation.vehicle_parts import Converter
 
 @dataclass(frozen=True)
 class Drive:
-    """Engine and vehicle around a gearbox, and how it is shifted.
+    """`[drive]`: engine and vehicle around a gearbox, and how it is shifted.
 
     Inertias [kg m^2]: `engine_inertia` joins the gearbox input, `vehicle_inertia` is at the wheel.
     `engine_torque` drives up-shifts, `overrun_torque` (negative) brakes in down-shifts [N m];
@@ -29,17 +32,17 @@ class Drive:
     [s] of the torque and inertia phases.
     """
 
-    engine_inertia: float
-    engine_torque: float
-    overrun_torque: float
-    engine_speed: float
-    final_drive: float
-    vehicle_inertia: float
-    shaft_stiffness: float
-    shaft_damping: float
-    load_torque: float
-    torque_phase: float
-    inertia_phase: float
+    engine_inertia: Annotated[float, Field(gt=0, alias="engine_inertia_kgm2")]
+    engine_torque: Annotated[float, Field(gt=0, alias="engine_torque_Nm")]
+    overrun_torque: Annotated[float, Field(lt=0, alias="overrun_torque_Nm")]
+    engine_speed: Annotated[float, Field(gt=0, alias="engine_speed_rpm"), IN_RPM]
+    final_drive: Annotated[float, Field(gt=0)]
+    vehicle_inertia: Annotated[float, Field(gt=0, alias="vehicle_inertia_kgm2")]
+    shaft_stiffness: Annotated[float, Field(gt=0, alias="shaft_stiffness_Nm_rad")]
+    shaft_damping: Annotated[float, Field(ge=0, alias="shaft_damping_Nms_rad")]
+    load_torque: Annotated[float, Field(alias="load_torque_Nm")] = 0.0
+    torque_phase: Annotated[float, Field(gt=0, alias="torque_phase_s")] = 0.15
+    inertia_phase: Annotated[float, Field(gt=0, alias="inertia_phase_s")] = 0.35
 
     def build_output_side(self, load: RoadLoad) -> OutputSide:
         """Build the output side with a load at the wheel."""

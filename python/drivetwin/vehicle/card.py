@@ -193,7 +193,7 @@ def load_card(path: Path | str) -> VehicleCard:
         J_vehicle_range=file.inertia.vehicle_range,
         J_out=None if J_out is None else J_out.to_prior(describe_inertia),
         sensors=_convert_tolerances(file.sensors),
-        channels={role: table.to_spec() for role, table in file.channels.iterate_roles()},
+        channels=dict(file.channels.iterate_roles()),
         source=str(path),
         known=_collect_known(file),
         J1=None if file.inertia.J1_kgm2 is None else file.inertia.J1_kgm2.to_prior(),

@@ -11,6 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from numbers import Real
+from typing import Annotated
+
+from pydantic import Field
 
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.errors import InputError, Where, suggest_spelling
@@ -42,7 +45,7 @@ class Lock:
 
     kind: LockKind
     value: float = 0.0
-    std: float = 0.0
+    std: Annotated[float, Field(ge=0)] = 0.0
 
     def to_prior(self) -> PriorValue:
         """As a design value."""

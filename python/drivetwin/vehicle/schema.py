@@ -17,10 +17,10 @@ from pydantic import (
     model_validator,
 )
 
-from drivetwin._util.toml import StrictModel
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin._util.toml import FromTable, StrictModel
+from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.mapping_file import ByRole, ChannelTable
-from drivetwin.channels.units import BAR, convert_table
+from drivetwin.channels.units import BAR, IN_BAR, IN_RPM
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.card_fields import read_card_fields
 from drivetwin.vehicle.converter import ConverterTable
@@ -201,28 +201,6 @@ class GearTable(StrictModel):
         return Gear(self.name, self.ratio.to_prior(), tuple(self.elements), eta)
 
 
-def _bound(name: str, unit: float = 1.0) -> Any:
-    """Field limits of a parameter of the actuator, in a file unit of this size."""
-    one = QUANTITIES[name]
-    return Field(ge=one.lower / unit, le=one.upper / unit)
-
-
-class ActuatorTable(StrictModel):
-    """`[elements.<name>.actuator]`: hydraulics between command and clutch pressure."""
-
-    dead_time_s: Annotated[float, _bound("dead_time")]
-    rising_lag_s: Annotated[float, _bound("rising_lag")]
-    falling_lag_s: Annotated[float, _bound("falling_lag")]
-    damping: Annotated[float, _bound("damping")] = 1.0
-    kiss_pressure_bar: Annotated[float, _bound("kiss_pressure", BAR)] = 0.0
-    fill_time_s: Annotated[float, _bound("fill_time")] = 0.0
-    hysteresis_bar: Annotated[float, _bound("hysteresis", BAR)] = 0.0
-
-    def to_model(self) -> ActuatorModel:
-        """Return the actuator in SI."""
-        return ActuatorModel(**convert_table(self))
-
-
 class ElementTable(StrictModel):
     """`[elements.<name>]`: a brake or clutch; its gain as one number or from its geometry."""
 
@@ -239,7 +217,7 @@ class ElementTable(StrictModel):
     drum_inertia_kgm2: PriorEntry = PriorTable(value=0.0)
     i_c: SignedRatioEntry | None = None
     i_out: SignedRatioEntry | None = None
-    actuator: ActuatorTable | None = None
+    actuator: Annotated[ActuatorModel, FromTable] | None = None
 
     @model_validator(mode="after")
     def _check_complete(self) -> ElementTable:
@@ -285,7 +263,7 @@ class ElementTable(StrictModel):
             i_c=None if self.i_c is None else self.i_c.to_prior(),
             i_out=None if self.i_out is None else self.i_out.to_prior(),
             geometry=self.geometry,
-            actuator=None if self.actuator is None else self.actuator.to_model(),
+            actuator=self.actuator,
         )
 
 
@@ -330,36 +308,36 @@ class SensorTable(StrictModel):
 
     def to_tolerance(self) -> SensorTolerance:
         """Return the tolerances in SI."""
-        found = convert_table(self)
-        return SensorTolerance(
-            **{key.removesuffix("_tolerance"): one for key, one in found.items()}
-        )
+        return SensorTolerance(**{key.removesuffix("_tolerance"): one for key, one in self})
+
+
+Age = Annotated[float, Field(alias="age_tolerance_ms", ge=0), AfterValidator((1e-3).__mul__)]
 
 
 class EngineTorqueSensor(SensorTable):
     """Tolerances of the engine torque message; how old it is, is a parameter (te_delay)."""
 
-    offset_tolerance_Nm: float = Field(default=0.0, ge=0)
+    offset_tolerance: Annotated[float, Field(alias="offset_tolerance_Nm", ge=0)] = 0.0
 
 
 class TorqueSensor(EngineTorqueSensor):
     """Tolerances of a torque sensor."""
 
-    age_tolerance_ms: float = Field(default=0.0, ge=0)
+    age_tolerance: Age = 0.0
 
 
 class SpeedSensor(SensorTable):
     """Tolerances of a speed sensor."""
 
-    age_tolerance_ms: float = Field(default=0.0, ge=0)
-    offset_tolerance_rpm: float = Field(default=0.0, ge=0)
+    age_tolerance: Age = 0.0
+    offset_tolerance: Annotated[float, Field(alias="offset_tolerance_rpm", ge=0), IN_RPM] = 0.0
 
 
 class PressureSensor(SensorTable):
     """Tolerances of a pressure sensor."""
 
-    age_tolerance_ms: float = Field(default=0.0, ge=0)
-    offset_tolerance_bar: float = Field(default=0.0, ge=0)
+    age_tolerance: Age = 0.0
+    offset_tolerance: Annotated[float, Field(alias="offset_tolerance_bar", ge=0), IN_BAR] = 0.0
 
 
 class SensorsTable(StrictModel):

@@ -6,19 +6,19 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, field_validator
 
 from drivetwin._util.atomic import write_bytes, write_text
-from drivetwin._util.toml import StrictModel, format_key_path
+from drivetwin._util.toml import FromTable, StrictModel, format_key_path
 from drivetwin._util.version import get_program_version
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.twin_file import TwinFile, build_twin_file, restore_twin
-from drivetwin.vehicle.locks import Lock, LockKind
+from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.phases import Boundary
@@ -35,14 +35,6 @@ class FileEntry(StrictModel):
 
     path: str = Field(min_length=1, max_length=1000)
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
-
-
-class LockEntry(StrictModel):
-    """A lock; SI."""
-
-    kind: LockKind
-    value: float = 0.0
-    std: float = Field(default=0.0, ge=0)
 
 
 class LogEntry(StrictModel):
@@ -70,8 +62,7 @@ class LogEntry(StrictModel):
 
     def to_corrections(self) -> Corrections:
         """Return the corrections of the mapping."""
-        channels = {role: table.to_spec() for role, table in self.channels.items()}
-        return Corrections(channels, tuple(self.ignored), self.time_unit)
+        return Corrections(self.channels, tuple(self.ignored), self.time_unit)
 
 
 class WorkspaceFile(StrictModel):
@@ -83,7 +74,7 @@ class WorkspaceFile(StrictModel):
     logs: list[LogEntry] = Field(min_length=1, max_length=MOST_LOGS)
     card: FileEntry
     log: int = Field(default=0, ge=0)
-    locks: dict[str, LockEntry] = Field(default_factory=dict)
+    locks: dict[str, Annotated[Lock, FromTable]] = Field(default_factory=dict)
     twins: dict[Method, dict[str, TwinFile]] = Field(default_factory=dict)
     method: Method | None = None
     shift: int = Field(default=0, ge=0)
@@ -115,7 +106,7 @@ def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
         logs=[_make_log_entry(one, path.parent, folder) for one in work.logs],
         card=_make_file_entry(work.card, path.parent, folder),
         log=work.at,
-        locks={name: LockEntry(**vars(one)) for name, one in work.locks.items()},
+        locks=dict(work.locks),
         twins={
             method: {name: build_twin_file(twin) for name, twin in one.twins.items()}
             for method, one in work.results.items()
@@ -166,7 +157,7 @@ def restore_workspace(content: WorkspaceFile, work: SessionState) -> SessionStat
             work = work.apply_moves(shift, times)
     work = work.hold_out([frozenset(entry.held) for entry in content.logs])
     for name, lock in content.locks.items():
-        work = work.set_lock(name, Lock(**dict(lock)))
+        work = work.set_lock(name, lock)
     results = {
         method: Outcome(method, {name: restore_twin(twin) for name, twin in twins.items()})
         for method, twins in content.twins.items()
@@ -199,9 +190,7 @@ def compute_digest(path: Path) -> str:
 def _make_log_entry(one: OpenLog, beside: Path, folder: Folder) -> LogEntry:
     return LogEntry(
         file=_make_file_entry(one.source, beside, folder),
-        channels={
-            role: ChannelTable.from_spec(spec) for role, spec in one.corrections.channels.items()
-        },
+        channels=dict(one.corrections.channels),
         ignored=list(one.corrections.ignored),
         time_unit=one.corrections.time_unit,
         phases={index: dict(times) for index, times in one.moves.items()},

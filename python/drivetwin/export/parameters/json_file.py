@@ -5,36 +5,16 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from typing import Annotated
 
-from pydantic import Field, FiniteFloat, ValidationError
+from pydantic import Field, ValidationError
 
-from drivetwin._util.toml import StrictModel
+from drivetwin._util.toml import FromTable, StrictModel
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.export.parameters.content import Axis, Codec, ParameterSet, Scalar, build_curve
+from drivetwin.export.parameters.content import Codec, Curve, ParameterSet, Scalar, build_curve
 from drivetwin.export.parameters.spelling import to_free_name, to_one_line
 
 SCHEMA = "drivetwin/parameters-1"
-
-
-class _ScalarRecord(StrictModel):
-    name: str
-    value: FiniteFloat
-    unit: str = "1"
-    text: str = ""
-
-
-class _AxisRecord(StrictModel):
-    name: str
-    points: list[FiniteFloat] = Field(min_length=1)
-    unit: str = "1"
-
-
-class _CurveRecord(StrictModel):
-    name: str
-    axis: _AxisRecord
-    values: list[FiniteFloat] = Field(min_length=1)
-    unit: str = "1"
-    text: str = ""
 
 
 class ParameterFile(StrictModel):
@@ -42,8 +22,8 @@ class ParameterFile(StrictModel):
 
     schema_name: str = Field(alias="schema", pattern=f"^{SCHEMA}$")
     name: str
-    scalars: list[_ScalarRecord]
-    curves: list[_CurveRecord]
+    scalars: list[Annotated[Scalar, FromTable]]
+    curves: list[Annotated[Curve, FromTable]]
     notes: list[str] = Field(default_factory=list)
 
 
@@ -65,17 +45,10 @@ def _parse_json(text: str, source: str) -> ParameterSet:
             Where(file=source),
         ) from None
     curves = (
-        build_curve(
-            one.name,
-            Axis(one.axis.name, tuple(one.axis.points), one.axis.unit),
-            one.values,
-            (one.unit, one.text),
-            source,
-        )
+        build_curve(one.name, one.axis, one.values, (one.unit, one.text), source)
         for one in file.curves
     )
-    scalars = (Scalar(**one.model_dump()) for one in file.scalars)
-    return ParameterSet(file.name, tuple(scalars), tuple(curves), notes=tuple(file.notes))
+    return ParameterSet(file.name, tuple(file.scalars), tuple(curves), notes=tuple(file.notes))
 
 
 CODEC = Codec(_write_json, _parse_json, to_free_name, to_one_line)
