@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from drivetwin.vehicle.card_fields import CardField, read_card_fields
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -44,6 +48,13 @@ _MODELS = {
 """Module below the package, and the model there, by which the program itself checks the file; each
 is imported when it is asked for."""
 
+_FIELDS = {
+    FileKind.VEHICLE_CARD: "vehicle/card_fields.toml",
+    FileKind.GEARBOX_CARD: "gearbox/card_fields.toml",
+    FileKind.POWERTRAIN: "drive/powertrain_fields.toml",
+}
+"""Meanings of the keys by file below the package."""
+
 
 def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a file, e.g. of `vehicle-card`.
@@ -60,7 +71,35 @@ def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
     module, name = _MODELS[kind]
     model: type[BaseModel] = getattr(import_module(f"drivetwin.{module}"), name)
     schema = {**model.model_json_schema(), **head}
+    if kind in _FIELDS:
+        _describe_keys(schema, kind)
     return _insert_elements(schema) if kind is FileKind.MODEL else schema
+
+
+def read_key_fields(kind: FileKind) -> Mapping[str, CardField]:
+    """Read the meanings of the keys of a card by name."""
+    return read_card_fields(Path(__file__).parents[1] / _FIELDS[kind])
+
+
+def _describe_keys(schema: dict[str, Any], kind: FileKind) -> None:
+    """Add the meaning of each key to the schema of a card."""
+    for field in read_key_fields(kind).values():
+        if field.entry:
+            first = schema["properties"][field.key[0]]
+            tables = _iterate_tables(schema, first) if field.key[1:] else [schema["properties"]]
+            for entries in tables:
+                entries.get(field.entry, {})["description"] = field.reference
+
+
+def _iterate_tables(schema: dict[str, Any], node: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the entries of the tables at and below a node of a schema."""
+    node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
+    entries = node.get("properties", {})
+    yield entries
+    below = (*entries.values(), *node.get("anyOf", ()), node.get("items"))
+    for one in (*below, node.get("additionalProperties")):
+        if isinstance(one, dict):
+            yield from _iterate_tables(schema, one)
 
 
 def _insert_elements(schema: dict[str, Any]) -> dict[str, Any]:

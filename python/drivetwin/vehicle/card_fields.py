@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fields of a vehicle card, each stated once; `card_fields.toml` has them."""
+"""Fields of cards, each stated once in a TOML file; those of the vehicle in `card_fields.toml`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class CardField:
-    """A field of a vehicle card, or a quantity that a field follows from.
+    """A field of a card, or a quantity that a field follows from.
 
     `key` is the place of its answer, without the name of an element. `entry` is its key on the
     card, empty for a quantity without one, and `default` the value without it. `comment` is the
@@ -52,10 +52,13 @@ class CardField:
         return self.help or f"{self.prompt}{unit}."
 
 
+VEHICLE_CARD = Path(__file__).with_suffix(".toml")
+
+
 @cache
-def read_card_fields() -> Mapping[str, CardField]:
+def read_card_fields(file: Path = VEHICLE_CARD) -> Mapping[str, CardField]:
     """Read the fields by name, such as `elements.P0_bar`, in the order of the reference page."""
-    tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    tables = tomllib.loads(file.read_text(encoding="utf-8"))
     fields = {}
     group = ""
     for name, table in tables.items():

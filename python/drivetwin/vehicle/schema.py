@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import (
     AfterValidator,
     BeforeValidator,
-    ConfigDict,
     Discriminator,
     Field,
     Tag,
@@ -22,7 +21,6 @@ from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.mapping_file import ByRole, ChannelTable
 from drivetwin.channels.units import BAR, IN_BAR, IN_RPM
 from drivetwin.simulation.dual_clutch import LossLaw
-from drivetwin.vehicle.card_fields import read_card_fields
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.effects import EffectPrior
 from drivetwin.vehicle.spec import (
@@ -37,17 +35,6 @@ from drivetwin.vehicle.spec import (
     describe_ratio,
     parse_teeth,
 )
-
-
-def _describe(schema: dict[str, Any], *section: str) -> None:
-    """Describe the keys of a table in its JSON Schema by the fields of a section of the card."""
-    for field in read_card_fields().values():
-        if field.key[:-1] == section and field.entry in schema["properties"]:
-            schema["properties"][field.entry]["description"] = field.reference
-
-
-def _configure(*section: str) -> ConfigDict:
-    return ConfigDict(json_schema_extra=lambda schema: _describe(schema, *section))
 
 
 class PriorTable(StrictModel):
@@ -188,8 +175,6 @@ InertiaEntry = Annotated[
 class GearTable(StrictModel):
     """`[[gears]]`: one gear, its ratio without the input gear, the shift elements that make it."""
 
-    model_config = _configure("gears")
-
     name: str = Field(min_length=1)
     ratio: RatioEntry
     elements: list[str] = Field(min_length=1)
@@ -203,8 +188,6 @@ class GearTable(StrictModel):
 
 class ElementTable(StrictModel):
     """`[elements.<name>]`: a brake or clutch; its gain as one number or from its geometry."""
-
-    model_config = _configure("elements")
 
     kind: Literal["brake", "clutch"]
     gain_m3: GainEntry | None = None
@@ -270,8 +253,6 @@ class ElementTable(StrictModel):
 class InertiaTable(StrictModel):
     """`[inertia]`: plausible ranges and known inertias, all in kg m^2."""
 
-    model_config = _configure("inertia")
-
     J_prime_kgm2: RangeEntry
     J_vehicle_kgm2: InertiaEntry
     J_out_kgm2: PriorEntry | None = None
@@ -301,8 +282,6 @@ def _refuse_percent(tolerance: float) -> float:
 class SensorTable(StrictModel):
     """`[sensors.<role>]`: standard deviations of a sensor's constant gain and offset errors, and of
     the age of its values."""
-
-    model_config = _configure("sensors")
 
     gain_tolerance: Annotated[float, Field(ge=0), AfterValidator(_refuse_percent)] = 0.0
 
@@ -378,8 +357,6 @@ EffectEntry = Annotated[
 
 class CardFile(StrictModel):
     """A vehicle card."""
-
-    model_config = _configure()
 
     name: str = Field(min_length=1)
     loss_law: LossLaw = "paper"
