@@ -120,9 +120,9 @@ def format_page(case: Case) -> str:
             spent = measure_core(case, step, accuracy)
             host.append(f"| {step} ms | core, {name} | {spent / 1e3:.2f} µs | |")
         for real, defines in (("double", ()), ("float", ("-DDT_FLOAT",))):
-            told = measure_here(case, step, defines)
+            measured = measure_here(case, step, defines)
             for name, label in (("step", "model"), ("observer", "observer")):
-                cost = told[name]
+                cost = measured[name]
                 host.append(
                     f"| {step} ms | C {label}, {real} | {cost.mean / 1e3:.2f} µs "
                     f"| {cost.largest / 1e3:.1f} µs |"

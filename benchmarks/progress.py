@@ -95,8 +95,8 @@ class Timeline:
         """
         at = np.linspace(0.0, 0.95 * self.whole, 200)
         left = [(self.whole - one, self.compute_time_left(one)) for one in at.tolist()]
-        shown = [(true, told) for true, told in left if told is not None]
-        right = [true / factor <= told <= factor * true for true, told in shown]
+        shown = [(true, announced) for true, announced in left if announced is not None]
+        right = [true / factor <= announced <= factor * true for true, announced in shown]
         return len(shown) / len(left), sum(right) / max(len(shown), 1)
 
 

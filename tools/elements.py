@@ -31,16 +31,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from drivetwin.modeling.component import Component
 from drivetwin.modeling.element_help import document_methods
-from drivetwin.modeling.model_parts import ModelParts, Place
-from drivetwin.modeling.part import Part
+from drivetwin.modeling.model_components import ModelComponents, Place
 from drivetwin.modeling.plates import Plates
+from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.network import InputValue
-from drivetwin.simulation.vehicle_parts import Converter
 
 
 @document_methods
-class ElementMethods(ModelParts):
+class ElementMethods(ModelComponents):
     """Methods that add elements; the class decorator adds law and parameters to their help."""
 '''
 _TYPES = {
@@ -81,7 +81,7 @@ def _write_method(kind: str, element: ElementType) -> str:
     parameters = ["self", "name: str", *positional, *(["*", *keywords] if keywords else [])]
     indent = " " * 8
     lines = [
-        *_wrap(f"    def {kind}(", parameters, ") -> Part:"),
+        *_wrap(f"    def {kind}(", parameters, ") -> Component:"),
         fill(f'"""{element.help}"""', 100, initial_indent=indent, subsequent_indent=indent),
         *_wrap(f"{indent}return self._add(", arguments, ")"),
     ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Units made like a true vehicle, with its departures: shifts with profiles, and logs of them."""
+"""Units made like a true vehicle, with its effects: shifts with profiles, and logs of them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _METRICS = (Metric.PEAK_JERK, Metric.SHIFT_TIME)
 
 @dataclass(frozen=True, eq=False)
 class TrueUnits:
-    """Made units around a true vehicle, with its departures; `shift` has the operating point."""
+    """Made units around a true vehicle, with its effects; `shift` has the operating point."""
 
     made: MadeVehicle
     shift: Maneuver
@@ -53,17 +53,17 @@ class TrueUnits:
     def evaluate(self, control: Control) -> Outcome:
         """Return the metrics of profiles over all units, which run side by side."""
         assert isinstance(control, Profiles)
-        shift, parts = self.shift, self.units[0].parts
+        shift, added = self.shift, self.units[0].added
         names = (shift.offgoing.name, shift.oncoming.name)
         true = follow_profiles(self.made, shift, control).sample(shift.time)
         pressures = dict(zip(names, (true.offgoing, true.oncoming), strict=True))
         acting = self.made.build_acting(true.engine_torque, pressures)
         torque = acting["engine_torque"]
-        driving = float(torque.values[0]) - parts.input_drag
+        driving = float(torque.values[0]) - added.input_drag
         point = OperatingPoint(driving, shift.point.engine_speed)
-        own = replace(shift, model=self.units[0].model, point=point, parts=parts, path=DIRECT)
+        own = replace(shift, model=self.units[0].model, point=point, added=added, path=DIRECT)
         if driving not in self.drawn:
-            drivelines = [Driveline(one.model, one.parts) for one in self.units]
+            drivelines = [Driveline(one.model, one.added) for one in self.units]
             self.drawn[driving] = collect_scenarios(own, drivelines)
         profiles = Profiles(torque, *(acting["pressures"][name] for name in names))
         plant = Plant(own, threads=1, metrics=_METRICS)

@@ -171,7 +171,7 @@ def make_vehicle(
     effects = {} if effect is None else {effect: draw_size(seed, effect, 1.0)}
     recorded = misread(run(scenario, seed, effects=effects), seed)
     twin = _identify(replace(drawn, card=add_tolerances(drawn.card, scenario)), recorded)
-    twin = twin if parts else twin.drop_part()
+    twin = twin if parts else twin.drop_added_elements()
     lag = float(np.random.default_rng([seed, 42]).uniform(0.03, 0.07))
     return MadeVehicle(seed, scenario, effects, recorded, lag, twin)
 

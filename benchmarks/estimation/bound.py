@@ -37,13 +37,13 @@ def compute_noise(bench: Bench, role: str) -> float:
 
 
 def compute_bound(
-    bench: Bench, part: ShiftTerm, truth: ParameterVector, prior: Prior
+    bench: Bench, term: ShiftTerm, truth: ParameterVector, prior: Prior
 ) -> FloatArray:
     """Compute the least covariance (p, p) of the unknowns; `bench` and `part` have no noise."""
-    found = part.linearise(truth)
+    found = term.linearise(truth)
     assert found is not None
     slopes = found[1]
-    outputs = part.record.outputs
+    outputs = term.record.outputs
     names = {"engine_speed": "input_speed"}
     sigma = np.concatenate(
         [
@@ -51,7 +51,7 @@ def compute_bound(
             for out in outputs
         ]
     )
-    G = compute_response(bench, part, truth) / sigma[:, None]
+    G = compute_response(bench, term, truth) / sigma[:, None]
     slopes = slopes / sigma[:, None]
     inner = np.eye(G.shape[1]) + G.T @ G
     through = G.T @ slopes
@@ -62,21 +62,21 @@ def compute_bound(
     return np.asarray(inverse / np.outer(scale, scale))
 
 
-def compute_response(bench: Bench, part: ShiftTerm, truth: ParameterVector) -> FloatArray:
+def compute_response(bench: Bench, term: ShiftTerm, truth: ParameterVector) -> FloatArray:
     """Compute G·Q^½ (n, m): change of the outputs by one sigma of each input sample that acts."""
-    base = part.simulate(truth)
+    base = term.simulate(truth)
     assert base is not None
-    start = part.record.sample_run(base)
+    start = term.record.sample_run(base)
     columns = []
-    for name, signal in _collect_inputs(part).items():
+    for name, signal in _collect_inputs(term).items():
         role = "engine_torque" if name == "engine torque" else f"pressure.{name}"
         std = compute_noise(bench, role)
-        acting = np.array([k for k, t in enumerate(signal.time) if _can_act(part, name, float(t))])
+        acting = np.array([k for k, t in enumerate(signal.time) if _can_act(term, name, float(t))])
         for first in range(0, acting.size, BLOCK):
             block = acting[first : first + BLOCK]
-            if _is_seen(std * _compute_change(part, truth, start, name, block)):
+            if _is_seen(std * _compute_change(term, truth, start, name, block)):
                 found = [
-                    std * _compute_change(part, truth, start, name, one) for one in block[:, None]
+                    std * _compute_change(term, truth, start, name, one) for one in block[:, None]
                 ]
                 columns += [one for one in found if _is_seen(one)]
     return np.column_stack(columns)
@@ -87,38 +87,38 @@ def _is_seen(change: FloatArray) -> bool:
 
 
 def _compute_change(
-    part: ShiftTerm, truth: ParameterVector, start: FloatArray, name: str, samples: IndexArray
+    term: ShiftTerm, truth: ParameterVector, start: FloatArray, name: str, samples: IndexArray
 ) -> FloatArray:
     """Compute the change of the outputs (n,) from `start`, which they are at the truth, per unit of
     a common disturbance of samples of an input.
     """
     step = STEPS.get(name, PRESSURE_STEP)
-    run = _disturb(part, name, samples, step).simulate(truth)
+    run = _disturb(term, name, samples, step).simulate(truth)
     assert run is not None
-    return (part.record.sample_run(run) - start) / step
+    return (term.record.sample_run(run) - start) / step
 
 
-def _collect_inputs(part: ShiftTerm) -> dict[str, Signal]:
-    return {"engine torque": part.record.engine_torque} | dict(part.record.pressures)
+def _collect_inputs(term: ShiftTerm) -> dict[str, Signal]:
+    return {"engine torque": term.record.engine_torque} | dict(term.record.pressures)
 
 
-def _can_act(part: ShiftTerm, name: str, stamp: float) -> bool:
+def _can_act(term: ShiftTerm, name: str, stamp: float) -> bool:
     """Return whether a sample can act: a pressure does not while its element is fully engaged."""
-    time = part.record.time
+    time = term.record.time
     if name == "engine torque":
         return bool(time[0] - 0.1 < stamp < time[-1] + 0.1)
-    pressure = part.record.pressures[name]
-    low = part.structure.driveline.couplings[name].P0.value - PRESSURE_STEP
+    pressure = term.record.pressures[name]
+    low = term.structure.driveline.couplings[name].P0.value - PRESSURE_STEP
     value = float(np.interp(stamp, pressure.time, pressure.values))
     return bool(time[0] < stamp < time[-1]) and value > low
 
 
-def _disturb(part: ShiftTerm, name: str, samples: IndexArray, step: float) -> ShiftTerm:
-    record = part.record
-    signal = _collect_inputs(part)[name]
+def _disturb(term: ShiftTerm, name: str, samples: IndexArray, step: float) -> ShiftTerm:
+    record = term.record
+    signal = _collect_inputs(term)[name]
     values = signal.values.copy()
     values[samples] += step
     changed = Signal(signal.time, values)
     if name == "engine torque":
-        return replace(part, record=replace(record, engine_torque=changed))
-    return replace(part, record=replace(record, pressures={**record.pressures, name: changed}))
+        return replace(term, record=replace(record, engine_torque=changed))
+    return replace(term, record=replace(record, pressures={**record.pressures, name: changed}))

@@ -26,7 +26,7 @@ from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolato
 from benchmarks.estimation.mismatch_log import Rates, make_mismatch_log
 from benchmarks.estimation.validity import judge
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.filling import Filling, FillKind
+from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.units import find_unit
 from drivetwin.dyno.files import convert_channels
 from drivetwin.errors import DrivetwinError
@@ -181,7 +181,7 @@ def study_log(seed: int, *, harm: Harm, identified: bool) -> FilledResult:
 
 def is_found(filling: Filling | None, period: float) -> bool:
     """Return True if the knots of a filling have this period [s] within 5 per cent."""
-    if filling is None or filling.kind is FillKind.UNKNOWN:
+    if filling is None or filling.interpolation is Interpolation.UNKNOWN:
         return False
     return abs(filling.period - period) < 0.05 * period
 

@@ -20,9 +20,9 @@ Written by `make accuracy` from noise realisations of the virtual dynamometer, o
 The bound is that of Cramér and Rao: the Fisher information at the truth, with the noise of
 outputs and inputs and the priors of the card in it, computed by disturbing every input sample of
 the simulation; nothing of it is taken from the fits. It takes for known whether signals are
-samples or means, which the fits decide; that costs the age of the engine torque some of its bound.
-Design values that the card knows only roughly are drawn about the truth. Coverage is that of the
-stated 95 % intervals from noise.
+samples or means, which the fits decide; that costs the delay of the engine torque some of its
+bound. Design values that the card knows only roughly are drawn about the truth. Coverage is that of
+the stated 95 % intervals from noise.
 From n realisations RMSE/bound has a standard error of 1/√(2n), coverage one of √(475/n) %.
 Each section names the code that it is from; one that names none is older than the choice between
 samples and means, curves and lines, and than the off-going element's own drop of friction.
@@ -56,8 +56,8 @@ stated on the card), against the total deviation.
 
 MISMATCH = """## What faults do that nobody states
 
-Shift of the mean of {count} realisations against the same seeds without the fault, in %; the age of
-the engine torque in ms. `chi2` is Q per sample without and with the fault: it does not warn. Jo′
+Shift of the mean of {count} realisations against the same seeds without the fault, in %; the delay
+of the engine torque in ms. `chi2` is Q per sample without and with the fault: it does not warn. Jo′
 ± 10 %, P0 known.
 """
 
@@ -96,10 +96,10 @@ def format_starts(outcomes: Counter[Outcome]) -> str:
 def format_unseen(logs: Sequence[Log]) -> str:
     """Return the section on vehicles drawn at random."""
     lines = [UNSEEN.format(count=len(logs)).rstrip("\n")]
-    told = _add_all(collect([log.deviates for log in logs]))
+    by_name = _add_all(collect([log.deviates for log in logs]))
     misread = _add_all(collect([log.misread for log in logs]))
     widths = _add_all(collect([log.widths for log in logs]))
-    for name, deviates in told.items():
+    for name, deviates in by_name.items():
         median, most = np.quantile(widths[name], [0.5, 0.9])
         width = (f"{median:.2f}", f"{most:.2f}")
         lines.append(
@@ -168,10 +168,12 @@ def format_study(study: Study, text: str) -> str:
 
 def _compute_ratios(study: Study) -> list[float]:
     """Return RMSE over bound of every parameter of the likelihood method."""
-    told = {n: s for n, s in study.samples["likelihood"].items() if study.bounds.get(n, 0.0) > 0.0}
+    bounded = {
+        n: s for n, s in study.samples["likelihood"].items() if study.bounds.get(n, 0.0) > 0.0
+    }
     return [
         float(np.sqrt(np.mean([one.error**2 for one in samples])) / study.bounds[name])
-        for name, samples in told.items()
+        for name, samples in bounded.items()
     ]
 
 

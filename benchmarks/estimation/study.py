@@ -129,7 +129,7 @@ def compute_bounds(scenario: Scenario, know: Knowledge) -> dict[str, float]:
     law = scenario.model.loss_law
     problem, start = build_problem([bench.signals], [driveline], law, build_guess(bench))
     truth = build_point(problem, start, bench)
-    covariance = compute_bound(bench, problem.parts[0], truth, problem.prior)
+    covariance = compute_bound(bench, problem.terms[0], truth, problem.prior)
     found = propagate(problem, truth, covariance, bench.signals)
     return {name: std for name, (_, std) in found.items()}
 
@@ -158,7 +158,7 @@ def build_guess(bench: Bench) -> dict[str, float]:
 
 def build_point(problem: ShiftObjective, start: ParameterVector, bench: Bench) -> ParameterVector:
     """Return the point of the truth, its start state included."""
-    run, time = bench.run.trajectory, problem.parts[0].record.time[0]
+    run, time = bench.run.trajectory, problem.terms[0].record.time[0]
     k = int(np.searchsorted(run.time, time))
     state = {
         "start0.speed": run.output_speed[k],
@@ -183,7 +183,7 @@ def propagate(
     variance = np.einsum("qp,pr,qr->q", matrix, covariance, matrix)
     pairs = zip(values.items(), variance, strict=True)
     found = {name: (value, float(np.sqrt(v))) for (name, value), v in pairs}
-    element = problem.parts[0].structure.driveline.oncoming.name
+    element = problem.terms[0].structure.driveline.oncoming.name
     index = [point.names.index(f"{element}.{key}") for key in LAW]
     found |= _propagate_friction(point.values[index], covariance[np.ix_(index, index)], slips)
     if "te_delay" not in point.names:

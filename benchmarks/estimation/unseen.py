@@ -162,7 +162,7 @@ def collect(logs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
 
 SHARED_SCALE = ("J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", AERO)
 OF_ELEMENTS = (*LAW[:-1], "drum")
-"""Unknowns that are told over η where the log has no output torque; the latter of each element."""
+"""Unknowns that are estimated over η where a log has no output torque; the latter by element."""
 MU_PLACES = (0.1, 0.5, 0.9)
 """Where in the slip range of a curve μ is compared."""
 
@@ -181,16 +181,16 @@ def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[
     slips = find_slips(curve)
     ideal = run(recorded.scenario, recorded.seed, noise=0.0)
     exact = _read_exactly(signals, ideal)
-    old = fit.problem.parts[0]
+    old = fit.problem.terms[0]
     bench = Bench(exact, old.structure.driveline, dict(recorded.truth.parameters), ideal)
     sensors = {sensor.role: sensor for sensor in recorded.scenario.sensors}
     means = SPEEDS if sensors["input_speed"].window > 0.0 else ()
     curved = {TORQUE} & fit.problem.modes
     record = build_record(exact, split_spans([exact])[0]).select_modes({*means, *curved})
-    part = ShiftTerm.from_sensor_noise(old.structure, record)
-    start = fit.point.replace_values(_build_values(fit.point, part, bench))
-    truth = build_point(replace(fit.problem, parts=(part,)), start, bench)
-    least = compute_bound(bench, part, truth, fit.problem.prior)
+    term = ShiftTerm.from_sensor_noise(old.structure, record)
+    start = fit.point.replace_values(_build_values(fit.point, term, bench))
+    truth = build_point(replace(fit.problem, terms=(term,)), start, bench)
+    least = compute_bound(bench, term, truth, fit.problem.prior)
     here = propagate(fit.problem, fit.mean, fit.covariance, exact, slips)
     there = propagate(fit.problem, truth, least, exact, slips)
     return {name: (here[name][1], there[name][1]) for name in here}
@@ -218,12 +218,12 @@ def _read_exactly(signals: ShiftSignals, ideal: DynoRun) -> ShiftSignals:
     )
 
 
-def _build_values(point: ParameterVector, part: ShiftTerm, bench: Bench) -> FloatArray:
+def _build_values(point: ParameterVector, term: ShiftTerm, bench: Bench) -> FloatArray:
     """Return the truth by unknown (p,), torques over η if the fit has them so; starts unchanged."""
     model = bench.run.scenario.model
     truth = {**build_guess(bench), TE_OFFSET: 0.0, AERO: model.load.aero}
-    truth["Tv_over_if"] += model.load.aero * part.structure.mean_speed**2 / model.i_f
-    if not part.scale_known:
+    truth["Tv_over_if"] += model.load.aero * term.structure.mean_speed**2 / model.i_f
+    if not term.scale_known:
         truth = _scale(truth, model)
     return np.array([truth.get(n, v) for n, v in zip(point.names, point.values, strict=True)])
 

@@ -133,7 +133,7 @@ def identify_validated(log: ShiftLog, card: VehicleCard) -> Identification:
 def correct_delay(
     truth: Mapping[str, float], effect: EffectId | None, size: float
 ) -> dict[str, float]:
-    """Return the truth with the mean age of an engine torque that acts late, by the effect."""
+    """Return the truth with the mean delay of an engine torque that acts late, by the effect."""
     lag = size if effect is EffectId.TORQUE_LAG else 0.0
     return {**truth, "te_delay": truth["te_delay"] - lag}
 

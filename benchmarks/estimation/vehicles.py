@@ -237,13 +237,13 @@ def _draw_sensors(rng: np.random.Generator, torque: float, model: DualClutch) ->
     rpm = np.pi / 30.0
     step = float(rng.choice([1e-4, 0.1 * rpm, 0.5 * rpm]))
     full = torque * model.eta * 2.5
-    age, resolution = float(rng.uniform(0.0, 0.03)), float(rng.choice([1.0, 0.5, 0.005 * torque]))
+    delay, resolution = float(rng.uniform(0.0, 0.03)), float(rng.choice([1.0, 0.5, 0.005 * torque]))
     can = float(rng.choice([50.0, 100.0]))
     p_noise = float(rng.uniform(2e3, 1e4))
     lower = model.elements[0].i_c * model.elements[0].i_out
     seen = [
         Sensor("engine_torque", Quantity.TORQUE, "EngTrq", "Nm", can,
-               0.002 * torque, resolution, age),
+               0.002 * torque, resolution, delay),
         *(Sensor(f"pressure.{one.name}", pressure, f"Prs{one.name}", "bar", inputs, p_noise, 10.0)
           for one in model.elements),
         Sensor("input_speed", speed, "SpdIn", "rpm", rate, noise, step, window=window),

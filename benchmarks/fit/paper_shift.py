@@ -4,7 +4,7 @@
 The likelihood fit is that without effects: one search, no selection of the load or of the sampling
 modes. Both start from the linear estimates and have the same priors, except for the off-going
 element: the likelihood fit gives it a level and a rise of its own, `Model.fit` its own mu_s. The
-age of the engine torque is minus the delay of the input.
+delay of the engine torque is minus the delay of the input.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
+from drivetwin.modeling.component import Component
 from drivetwin.modeling.model import Model
-from drivetwin.modeling.model_parts import Place
-from drivetwin.modeling.part import Part
+from drivetwin.modeling.model_components import Place
 from drivetwin.simulation.driveline import ENGINE, OUTPUT, SHAFT, WHEEL, build_driveline
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal
 from drivetwin.simulation.network import Output
@@ -42,7 +42,7 @@ from tests.support.bench import Bench, Knowledge, record_bench
 COUNT = 3
 """Noise realisations."""
 MU_STD, MU_V_STD, DELAY_STD = 0.2, 2e-3, 0.03
-"""Priors of the likelihood fit: mu_c and mu_s, mu_v [s/rad], age of the engine torque [s]."""
+"""Priors of the likelihood fit: mu_c and mu_s, mu_v [s/rad], delay of the engine torque [s]."""
 OUTPUTS: dict[str, Output] = {
     "output_torque": ("shaft_torque", SHAFT),
     "engine_speed": ("speed", ENGINE),
@@ -115,9 +115,9 @@ def fit_both(seed: int) -> tuple[Fitted, Fitted]:
 def _fit_network(
     bench: Bench, problem: LikelihoodObjective[ShiftTerm], start: ParameterVector
 ) -> dict[str, tuple[float, float]]:
-    part = problem.parts[0]
-    dual = part.structure.build_model(start)
-    record = part.record
+    term = problem.terms[0]
+    dual = term.structure.build_model(start)
+    record = term.record
     outputs = {
         one.name: Measured(record.time[one.place], one.values, one.sigma) for one in record.outputs
     }
@@ -140,7 +140,7 @@ def _build_model(
     model = Model("shift of the paper")
     model.add_elements(build_driveline(dual), inputs)
     speeds: dict[Place, float] = {OUTPUT: start["start0.speed"], WHEEL: start["start0.wheel_speed"]}
-    twists: dict[Part | str, float] = {SHAFT: start["start0.twist"]}
+    twists: dict[Component | str, float] = {SHAFT: start["start0.twist"]}
     model.start(speeds, twists=twists, locked=[bench.driveline.offgoing.name])
     return model
 

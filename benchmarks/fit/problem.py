@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.modeling.component import Component
 from drivetwin.modeling.model import Model
-from drivetwin.modeling.model_parts import Place
-from drivetwin.modeling.part import Part
+from drivetwin.modeling.model_components import Place
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind
 from drivetwin.simulation.network import Output
@@ -129,7 +129,7 @@ class Problem:
     @cached_property
     def logarithmic(self) -> frozenset[str]:
         """Unknowns that are sought by their logarithm: all their fields are positive."""
-        elements = {str(part.name): part.element for part in self.build().parts}
+        elements = {str(component.name): component.element for component in self.build().components}
         return frozenset(
             name
             for name, one in self.unknowns.items()
@@ -196,7 +196,7 @@ def set_start(
 ) -> None:
     """Set the start of a model: speeds of nodes, twists of shafts, elements without slip."""
     speeds: dict[Place, float] = {node: start[node] for node in nodes}
-    twists: dict[Part | str, float] = {shaft: start[shaft] for shaft in shafts}
+    twists: dict[Component | str, float] = {shaft: start[shaft] for shaft in shafts}
     model.start(speeds, twists=twists, locked=list(locked))
 
 

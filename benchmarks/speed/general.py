@@ -15,10 +15,10 @@ from drivetwin.gearbox import load_gearbox
 from drivetwin.gearbox import reduce as reduce_shift
 from drivetwin.gearbox.compare import build_dual_clutch_form, build_whole_gearbox
 from drivetwin.gearbox.maneuver import build_signals, build_time_grid, plan
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.driveline import SHAFT, WHEEL, build_driveline, build_start
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import Element, Output, Start, simulate
-from drivetwin.simulation.vehicle_parts import NO_PARTS
 from reference import tables
 from reference.problem import ROOT, load
 from tests.support.upshift.scenario import OUTPUTS, Scenario
@@ -140,7 +140,7 @@ def plan_gearbox_shifts() -> dict[str, Scenario]:
         FORM: Scenario(
             build_driveline(form),
             inputs,
-            build_start(form, NO_PARTS, start, torque, 0.0),
+            build_start(form, NO_ADDED_ELEMENTS, start, torque, 0.0),
             time,
             OUTPUTS,
         ),

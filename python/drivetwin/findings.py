@@ -296,8 +296,8 @@ class Finding:
     @property
     def text(self) -> str:
         """Place, subject, cause and remedy."""
-        told = "{subject}" in load_catalogue()[self.code].text
-        heads = (str(self.place), "" if told else self.subject)
+        is_named = "{subject}" in load_catalogue()[self.code].text
+        heads = (str(self.place), "" if is_named else self.subject)
         return ": ".join(part for part in (*heads, self.reason) if part)
 
     @property

@@ -16,9 +16,9 @@ from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.dyno.scenario import Sensor
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import TorqueError
 from drivetwin.logs.write import convert_to_recorded_units, write_log
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch
-from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 from tests.calibration.cases import SYSTEM, build_profiles
 
 _SPEED, _TORQUE, _PRESSURE = Quantity.SPEED, Quantity.TORQUE, Quantity.PRESSURE
@@ -38,7 +38,7 @@ def write_bench_log(
     model: DualClutch,
     late: float = 0.0,
     seed: int = 1,
-    parts: VehicleParts = NO_PARTS,
+    added: AddedElements = NO_ADDED_ELEMENTS,
     way: InputPath = DIRECT,
 ) -> Profiles:
     """Write the log of a power-on upshift of a driveline with the starting values of the policy.
@@ -54,7 +54,7 @@ def write_bench_log(
     late_way = replace(way, pressure_delay=late)
     acting = late_way.apply(given.engine_torque, pressures, model.elements, shift.time)
     torque = acting.pop(ENGINE_TORQUE)
-    run = DrivelineTask(model, parts, torque, acting, shift.build_start(), seen).simulate()
+    run = DrivelineTask(model, added, torque, acting, shift.build_start(), seen).simulate()
     inputs = {
         "engine_torque": given.engine_torque,
         **{f"pressure.{name}": one for name, one in pressures.items()},

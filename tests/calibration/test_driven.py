@@ -74,8 +74,8 @@ def test_a_log_has_the_calibration_that_its_pressures_follow(
     assert found.calibration == "own"
     assert found.profiles is not None
     assert found.request == pytest.approx(REQUEST, abs=2e-3)
-    assert found.departure is not None
-    assert found.departure < 3e3
+    assert found.misfit is not None
+    assert found.misfit < 3e3
     lower = replace(build(shift).engine_torque, values=build(shift).engine_torque.values - 100.0)
     same = replace(build(shift), engine_torque=lower)
     moved = match_profiles(logged, {"lower": same}, shift).profiles
@@ -84,8 +84,8 @@ def test_a_log_has_the_calibration_that_its_pressures_follow(
     assert demand == pytest.approx(POINT.engine_torque, abs=2.0)  # noise of the message
     none = match_profiles(logged, {"other": other}, shift)
     assert none.profiles is None
-    assert none.departure is not None
-    assert none.departure > 3e4
+    assert none.misfit is not None
+    assert none.misfit > 3e4
 
 
 def test_a_lag_of_the_torque_and_a_slope_of_the_capacity_are_found(

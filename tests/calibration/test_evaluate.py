@@ -22,9 +22,9 @@ from drivetwin.calibration.policy import Space
 from drivetwin.calibration.profiles import ClosedLoop, compute_nominal_profiles
 from drivetwin.calibration.scenarios import Purpose, collect_scenarios
 from drivetwin.calibration.twin_task import Request, build_task
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE
 from drivetwin.simulation.network import simulate
-from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.calibration.cases import (
     QUICK,
     SYSTEM,
@@ -33,7 +33,7 @@ from tests.calibration.cases import (
     make_slip_task,
     make_upshift,
 )
-from tests.calibration.twins import PARTS, add_part, assemble, make_hydraulic_twin
+from tests.calibration.twins import ADDED_ELEMENTS, assemble, extend_twin, make_hydraulic_twin
 
 
 def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,9 +46,9 @@ def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     profiles = space.build_control(space.start)
     whole = plant.evaluate(profiles, draws)
     monkeypatch.setattr(evaluate, "_CHUNK", 3)
-    parts = plant.evaluate(profiles, draws)
+    added = plant.evaluate(profiles, draws)
     for name, values in whole.values.items():
-        assert values == pytest.approx(parts.values[name], rel=1e-9, abs=1e-9)
+        assert values == pytest.approx(added.values[name], rel=1e-9, abs=1e-9)
     assert plant.count.runs == 14
     few = replace(plant, metrics=(Metric.FLARE,)).evaluate(profiles, draws)
     assert set(few.values) == {Metric.FLARE}
@@ -71,14 +71,14 @@ def test_late_pressures_move_the_shift_by_their_delay() -> None:
 
 def make_task(values: Mapping[str, float], kind: PolicyKind = PolicyKind.CONTROLLER) -> Task:
     """Task of a twin with the parameters of a part."""
-    twin = add_part(make_hydraulic_twin(), values)
+    twin = extend_twin(make_hydraulic_twin(), values)
     return build_task(twin, Request(gears=("2", "3"), policy=kind, limits=(), settings=QUICK))
 
 
 @pytest.mark.parametrize("kind", [PolicyKind.CONTROLLER, PolicyKind.SLIP])
-@pytest.mark.parametrize("part", list(PARTS))
+@pytest.mark.parametrize("part", list(ADDED_ELEMENTS))
 def test_the_predicted_motion_is_that_of_the_whole_network(part: str, kind: PolicyKind) -> None:
-    task = make_task(PARTS[part], kind)
+    task = make_task(ADDED_ELEMENTS[part], kind)
     shift, space = task.maneuver, Space(task.policy)
     control = space.build_control(space.start)
     drawn = draw_for(task, 1, Purpose.SEARCH)
@@ -92,7 +92,7 @@ def test_the_predicted_motion_is_that_of_the_whole_network(part: str, kind: Poli
         "B2": profiles.offgoing,
         "B3": profiles.oncoming,
     }
-    elements, start = assemble(shift, PARTS[part]), shift.start
+    elements, start = assemble(shift, ADDED_ELEMENTS[part]), shift.start
     run = simulate(elements, inputs, start, shift.time, list_outputs(shift))
     assert run.status == "completed"
     for column, expected in zip(columns[0], run.columns.values(), strict=True):
@@ -117,7 +117,7 @@ def compare_with_reduced(
         columns = plant.simulate(control, nominal, list_outputs(one)).columns
         return columns[0, 0], plant.evaluate(control, nominal)
 
-    return run(shift), run(replace(shift, parts=NO_PARTS))
+    return run(shift), run(replace(shift, added=NO_ADDED_ELEMENTS))
 
 
 @pytest.mark.parametrize(
@@ -136,12 +136,12 @@ def test_a_stiff_part_changes_nothing(values: dict[str, float], rel: float) -> N
 
 def test_a_soft_input_shaft_lowers_the_jerk_of_lockup() -> None:
     """Half of J1 is behind the input shaft: less inertia stops at the lock-up."""
-    (_, whole), (_, reduced) = compare_with_reduced(PARTS["input shaft"])
+    (_, whole), (_, reduced) = compare_with_reduced(ADDED_ELEMENTS["input shaft"])
     assert whole.values[Metric.PEAK_JERK] < 0.8 * reduced.values[Metric.PEAK_JERK]
 
 
 def test_play_acts_from_the_reversal_of_the_torque_on() -> None:
-    (torque, whole), (reduced, other) = compare_with_reduced(PARTS["backlash"])
+    (torque, whole), (reduced, other) = compare_with_reduced(ADDED_ELEMENTS["backlash"])
     reversal = int(np.argmax(reduced < 0.0))
     assert 0 < reversal < reduced.size
     np.testing.assert_allclose(torque[:reversal], reduced[:reversal], atol=1e-3)

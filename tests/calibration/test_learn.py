@@ -21,7 +21,7 @@ from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
 from drivetwin.validation.simulate_log import LoggedShift
 from tests.calibration.bench import write_bench_log
-from tests.calibration.twins import PARTS, STD, add_part, make_twin
+from tests.calibration.twins import ADDED_ELEMENTS, STD, extend_twin, make_twin
 
 REQUEST = 1.5
 """Instant of the request in the logs [s]."""
@@ -163,16 +163,16 @@ def test_a_second_log_narrows_the_values_of_a_distant_vehicle(twin: Twin, tmp_pa
 
 
 def test_the_part_of_the_vehicle_is_corrected_too(twin: Twin, tmp_path: Path) -> None:
-    given = add_part(twin, PARTS["input shaft"])
+    given = extend_twin(twin, ADDED_ELEMENTS["input shaft"])
     model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
-    true = 1.02 * PARTS["input shaft"]["mode_frequency"]
-    parts = given.build_parts(model, {"mode_frequency": true})
-    driven = drive(given, tmp_path / "bench.csv", model, parts=parts)
+    true = 1.02 * ADDED_ELEMENTS["input shaft"]["mode_frequency"]
+    added = given.build_added_elements(model, {"mode_frequency": true})
+    driven = drive(given, tmp_path / "bench.csv", model, added=added)
     found = correct_twin(given, [driven], Spread())
     frequency = found.twin.parameters["mode_frequency"]
-    assert found.twin.part_values.keys() == given.part_values.keys()
+    assert found.twin.added_element_values.keys() == given.added_element_values.keys()
     assert frequency.value is not None
     assert frequency.std_total is not None
-    assert frequency.std_total < 0.9 * STD * PARTS["input shaft"]["mode_frequency"]
+    assert frequency.std_total < 0.9 * STD * ADDED_ELEMENTS["input shaft"]["mode_frequency"]
     assert abs(frequency.value - true) < 3.0 * frequency.std_total
     assert found.after["output_torque"] < 1.3 * 15.0

@@ -17,7 +17,7 @@ from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from drivetwin.simulation.network import Output
 from drivetwin.simulation.network import simulate as simulate_network
 from tests.calibration.cases import SYSTEM, make_downshift, make_upshift
-from tests.calibration.twins import PARTS, add_part, make_twin
+from tests.calibration.twins import ADDED_ELEMENTS, extend_twin, make_twin
 
 
 @pytest.mark.parametrize("shift", [make_upshift(), make_downshift()])
@@ -35,9 +35,9 @@ def test_start_accelerates_steadily(shift: Maneuver) -> None:
     assert slope == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("part", list(PARTS))
+@pytest.mark.parametrize("part", list(ADDED_ELEMENTS))
 def test_start_with_a_part_accelerates_steadily(part: str) -> None:
-    twin = add_part(make_twin(), PARTS[part])
+    twin = extend_twin(make_twin(), ADDED_ELEMENTS[part])
     shift = build_task(twin, Request(gears=("2", "3"), limits=())).maneuver
     held = {"B2": SYSTEM, "B3": 0.0, ENGINE_TORQUE: shift.point.engine_torque}
     time = shift.time[:300]

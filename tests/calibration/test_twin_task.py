@@ -17,10 +17,10 @@ from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.shift_control import ControlledUnit
-from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.calibration.cases import ACTUATOR, FILLING, QUICK
-from tests.calibration.twins import PARTS, STD, add_part, make_hydraulic_twin, make_twin
+from tests.calibration.twins import ADDED_ELEMENTS, STD, extend_twin, make_hydraulic_twin, make_twin
 
 REQUEST = Request(gears=("2", "3"), settings=QUICK)
 _DRAWN = {"eta": "i_in.loss.eta", "k_o": "output shaft.stiffness", "J_vehicle": "J_v.inertia"}
@@ -64,11 +64,11 @@ def test_draws_follow_correlations() -> None:
     assert found[0, 1] == pytest.approx(0.9, abs=0.03)
 
 
-@pytest.mark.parametrize("part", list(PARTS))
+@pytest.mark.parametrize("part", list(ADDED_ELEMENTS))
 def test_draws_contain_the_part(part: str) -> None:
     plain = replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=())
-    task = build_task(add_part(make_twin(), PARTS[part]), plain)
-    assert task.maneuver.parts != NO_PARTS
+    task = build_task(extend_twin(make_twin(), ADDED_ELEMENTS[part]), plain)
+    assert task.maneuver.added != NO_ADDED_ELEMENTS
     sets = draw_for(task, 600, Purpose.SEARCH).sets
     relative = {
         "input shaft": ("input shaft.stiffness", np.hypot(2.0 * STD, np.hypot(STD, 2**0.5 * STD))),
@@ -84,11 +84,11 @@ def test_draws_contain_the_part(part: str) -> None:
 
 
 def test_a_part_without_an_interval_is_held() -> None:
-    twin = add_part(make_twin(), PARTS["backlash"])
+    twin = extend_twin(make_twin(), ADDED_ELEMENTS["backlash"])
     ids, covariance = make_twin().covariance_ids, make_twin().covariance
     known = replace(twin, covariance_ids=ids, covariance=covariance)
     task = build_task(known, replace(REQUEST, limits=()))
-    assert task.maneuver.parts.gap == 0.02
+    assert task.maneuver.added.gap == 0.02
     assert "output shaft.gap" not in draw_for(task, 20, Purpose.SEARCH).sets
 
 

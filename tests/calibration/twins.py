@@ -12,9 +12,9 @@ from scipy.linalg import block_diag
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, RIM_SHARE
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.simulation.network import Element, build_element
-from drivetwin.simulation.vehicle_parts import NO_PARTS, RIM_SHARE
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from tests.calibration.cases import ACTUATOR, FILLING
 from tests.support.upshift.statement import make_problem
@@ -81,17 +81,17 @@ def make_hydraulic_twin() -> Twin:
     return replace(make_twin(), actuators={"B2": ACTUATOR, "B3": FILLING})
 
 
-PARTS = {
+ADDED_ELEMENTS = {
     "input shaft": {"mode_frequency": 12.0, "mode_share": 0.5, "mode_damping": 0.05},
     "backlash": {"backlash": 0.02},
     "tyre": {"tyre_slip": 0.03, "shaft_reference": 8000.0},
     "progressive shaft": {"shaft_progression": 0.2, "shaft_reference": 8000.0},
 }
-"""Parameters of each part by id."""
+"""Parameters of each added element by id."""
 
 
-def add_part(twin: Twin, values: Mapping[str, float]) -> Twin:
-    """Return the twin with parameters of a part, by id, that it knows as well as the others."""
+def extend_twin(twin: Twin, values: Mapping[str, float]) -> Twin:
+    """Return the twin with parameters of an added element by id, known as well as the others."""
     assert twin.covariance is not None
     stds = [STD * value for value in values.values()]
     own = {
@@ -107,9 +107,11 @@ def add_part(twin: Twin, values: Mapping[str, float]) -> Twin:
 
 
 def assemble(shift: Maneuver, values: Mapping[str, float]) -> list[Element]:
-    """Put a part by hand into the elements of the dual clutch."""
+    """Put an added element by hand into the elements of the dual clutch."""
     model = shift.model
-    elements = {str(one["name"]): dict(one) for one in replace(shift, parts=NO_PARTS).elements}
+    elements = {
+        str(one["name"]): dict(one) for one in replace(shift, added=NO_ADDED_ELEMENTS).elements
+    }
     shaft, more = elements["output shaft"], []
     if "mode_frequency" in values:
         front, omega = values["mode_share"] * model.J1, 2.0 * np.pi * values["mode_frequency"]
@@ -133,10 +135,10 @@ def assemble(shift: Maneuver, values: Mapping[str, float]) -> list[Element]:
     elif "backlash" in values:
         shaft |= {"type": "backlash", "gap": values["backlash"]}
     else:
-        assert shift.parts.shaft_table is not None
-        linear = shaft.pop("stiffness") * np.array(shift.parts.shaft_table.twist)
+        assert shift.added.shaft_table is not None
+        linear = shaft.pop("stiffness") * np.array(shift.added.shaft_table.twist)
         share = linear / values["shaft_reference"]
         torque = linear * (1.0 + values["shaft_progression"] * (share**2 - 0.5))
-        twist = list(shift.parts.shaft_table.twist)
+        twist = list(shift.added.shaft_table.twist)
         shaft |= {"type": "spring_table", "twist": twist, "torque": torque.tolist()}
     return [*elements.values(), *more]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.filling import FillKind, find_filling
+from drivetwin.channels.filling import Interpolation, find_filling
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
 from drivetwin.logs.read import read_raw
 from tests.shifts.fixtures import shared
@@ -46,7 +46,9 @@ def check_filling(
     time = np.arange(np.ceil(phase), 4900.0) * STEP
     found = find_filling(time, np.round(fill(knots, values, kind, time), decimals))
     assert found is not None
-    assert found.kind is (FillKind.LINEAR if kind == "linear" else FillKind.CUBIC)
+    assert found.interpolation is (
+        Interpolation.LINEAR if kind == "linear" else Interpolation.CUBIC
+    )
     assert found.period == pytest.approx(factor * STEP, rel=1e-3)
     assert found.time.size == pytest.approx(4.9 / (factor * STEP), rel=0.02)
     # Instants and values: those that were measured, within what the rounding hides.
@@ -101,7 +103,7 @@ def test_finds_knots_of_messages_that_jitter(apart: tuple[float, float], decimal
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.round(np.interp(time, knots, measure_speed(knots, 3)), decimals))
     assert found is not None
-    assert found.kind is FillKind.LINEAR
+    assert found.interpolation is Interpolation.LINEAR
     nearest = np.abs(found.time[1:-1, np.newaxis] - knots).min(axis=1)
     assert np.quantile(nearest, 0.95) < max(10.0**-decimals, 1e-12)
 
@@ -113,7 +115,7 @@ def test_names_a_filling_without_lines() -> None:
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
     assert found is not None
-    assert found.kind is FillKind.UNKNOWN
+    assert found.interpolation is Interpolation.UNKNOWN
     assert found.time.size == 0
 
 
@@ -124,7 +126,7 @@ def test_names_a_filling_of_short_uneven_pieces() -> None:
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
     assert found is not None
-    assert found.kind is FillKind.UNKNOWN
+    assert found.interpolation is Interpolation.UNKNOWN
 
 
 @pytest.mark.parametrize("others", [(0.1,), (0.02, 0.007), (0.02, 0.025, 0.05, 0.1)])
@@ -142,7 +144,7 @@ def test_finds_samples_among_the_stamps_of_other_messages(
     values = np.interp(time, knots, measure_speed(knots, 8, 1.0))
     found = find_filling(time, np.round(values, decimals))
     assert found is not None
-    assert found.kind is FillKind.LINEAR
+    assert found.interpolation is Interpolation.LINEAR
     assert found.period == pytest.approx(0.01, rel=0.02)
     nearest = np.abs(found.time[:, np.newaxis] - knots).min(axis=1)
     assert np.mean(nearest < 1e-9) > (0.95 if decimals > 1 else 0.8)
@@ -161,7 +163,7 @@ def test_finds_messages_in_an_export_of_a_real_bus(name: str) -> None:
         (channel,) = log.get_channels(speed)
         found = channel.filling
         assert found is not None
-        assert found.kind is FillKind.LINEAR
+        assert found.interpolation is Interpolation.LINEAR
         assert found.period == pytest.approx(0.01, rel=0.01)
         assert np.isin(found.time, channel.time).all()
     (gear,) = log.get_channels("TransSelectedGear")
@@ -269,5 +271,5 @@ def test_knots_of_an_oscillation_that_repeats_exactly_are_found(noise: float) ->
     time = count(3990, 0.001)
     found = find_filling(time, np.interp(time, knots, values))
     assert found is not None
-    assert found.kind is FillKind.LINEAR
+    assert found.interpolation is Interpolation.LINEAR
     assert found.period == pytest.approx(0.01)

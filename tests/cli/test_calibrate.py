@@ -23,7 +23,13 @@ from drivetwin.files.twin_file import save_twin
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from drivetwin.simulation.network import simulate
 from tests.calibration.cases import QUICK
-from tests.calibration.twins import PARTS, add_part, assemble, make_hydraulic_twin, make_twin
+from tests.calibration.twins import (
+    ADDED_ELEMENTS,
+    assemble,
+    extend_twin,
+    make_hydraulic_twin,
+    make_twin,
+)
 
 FILES = {
     "calibration.toml",
@@ -146,7 +152,7 @@ def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> 
         name: replace(one, mu_lo=one.mu, mu_hi=one.mu) for name, one in make_twin().friction.items()
     }
     exact = replace(make_twin(), covariance_ids=(), covariance=None, friction=friction)
-    twin = replace(exact, parameters=add_part(make_twin(), PARTS[part]).parameters)
+    twin = replace(exact, parameters=extend_twin(make_twin(), ADDED_ELEMENTS[part]).parameters)
     save_twin(source, twin)
     names = ("gain", "engine_torque", "contact_pressure_Pa", "oil_temperature_K")
     spread = "".join(f"{name} = 0.0\n" for name in names)
@@ -162,7 +168,7 @@ def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> 
         for name, one in zip((ENGINE_TORQUE, "B2", "B3"), curves, strict=True)
     }
     start, outputs = shift.start, list_outputs(shift)
-    run = simulate(assemble(shift, PARTS[part]), inputs, start, shift.time, outputs)
+    run = simulate(assemble(shift, ADDED_ELEMENTS[part]), inputs, start, shift.time, outputs)
     torque, old, old_slip, new, new_slip = run.columns.values()
     jerk = np.gradient(0.5 * shift.model.i_f / shift.model.J_v * torque, shift.step)
     lock = [one.time for one in run.events if one.kind == "lock"][-1] - shift.request

@@ -106,7 +106,7 @@ def test_estimates_are_told(fleet: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "drift per" in " ".join(out.split())
     assert "Too few logs with a value of their own" in out
     assert main(["fleet", "estimate", store, "--parameter", "mu.X9", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"estimates": [], "untold": ["mu.X9"]}
+    assert json.loads(capsys.readouterr().out) == {"estimates": [], "missing": ["mu.X9"]}
 
 
 def test_logs_of_other_settings_are_told(

@@ -86,8 +86,8 @@ def slowed(found: Identification) -> Identification:
     fit, _ = get_likelihood_fit(found)
     rng = np.random.default_rng(2)
     residuals = tuple(
-        part.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], rng.normal(size=part.record.size))
-        for part in fit.problem.parts
+        term.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], rng.normal(size=term.record.size))
+        for term in fit.problem.terms
     )
     normal = replace(fit.normal, residuals=residuals)
     wide = replace(fit, normal=normal, covariance=compute_covariance(fit.problem, normal, fit.chi2))

@@ -16,8 +16,8 @@ from drivetwin.export.input_delays import InputDelays
 from drivetwin.export.modelica.model import format_modelica
 from drivetwin.export.subject import build_note, build_subject, compute_steady_start
 from drivetwin.export.targets import InputKind
+from drivetwin.simulation.added_elements import AddedElements
 from drivetwin.simulation.dual_clutch import RoadLoad
-from drivetwin.simulation.vehicle_parts import VehicleParts
 from tests.export.cases import paper_model
 from tests.export.parameters.sample import twin
 
@@ -54,7 +54,7 @@ def test_modelica_holds_the_parts_and_c_names_them_as_left_out() -> None:
 
 def test_the_error_of_the_reduced_form_is_that_of_its_run() -> None:
     """The torque goes through zero: with play it is late by the time that the gap takes."""
-    subject = replace(build_subject(twin()), parts=VehicleParts(gap=0.02))
+    subject = replace(build_subject(twin()), added=AddedElements(gap=0.02))
     time = np.linspace(0.0, 1.0, 1001)
     torque = np.interp(time, [0.0, 0.3, 0.4, 1.0], [600.0, 600.0, -2500.0, -2500.0])
     inputs = np.column_stack([torque, np.full(1001, 14e5), np.zeros(1001)])

@@ -233,7 +233,7 @@ def test_refusals_name_the_path_or_the_channel(
 def test_a_recorded_input_takes_the_place_of_that_of_the_model() -> None:
     model, recording = make_small(LEFT)
     found = fit_network(replace(model, inputs={"torque": 0.0}), [recording])
-    signal = found.problem.parts[0].record.inputs["torque"]
+    signal = found.problem.terms[0].record.inputs["torque"]
     assert np.ptp(signal.values) > 100.0
     assert found.status is ModelStatus.VALID
 
@@ -245,7 +245,7 @@ def test_speeds_that_follow_from_others_are_left_out_of_the_start() -> None:
     behind = {"out": start.speeds["turbine"] / 2.1, "axle": start.speeds["turbine"] / 7.35}
     more = replace(start, speeds={**start.speeds, **behind})
     problem, _, _ = build_problem(replace(made.model, start=more), [made.recording])
-    assert problem.parts[0].plant.own == ["engine", "turbine", "wheel", "half shafts"]
+    assert problem.terms[0].plant.own == ["engine", "turbine", "wheel", "half shafts"]
 
 
 def test_the_delay_of_an_input_leaves_the_start_of_a_node_of_its_name_unknown() -> None:
@@ -256,7 +256,7 @@ def test_the_delay_of_an_input_leaves_the_start_of_a_node_of_its_name_unknown() 
     )
     inputs = {"motor": recording.inputs["torque"]}
     problem, _, _ = build_problem(named, [replace(recording, inputs=inputs)])
-    assert "motor" in problem.parts[0].plant.own
+    assert "motor" in problem.terms[0].plant.own
 
 
 def test_a_bounded_delay_costs_no_more_of_the_recording_than_its_bounds() -> None:
@@ -264,5 +264,5 @@ def test_a_bounded_delay_costs_no_more_of_the_recording_than_its_bounds() -> Non
     for bounds in ((None, None), (-0.02, 0.02)):
         model, recording = make_small({"delay.torque": Unknown(0.0, 0.03, bounds)})
         problem, _, _ = build_problem(model, [recording])
-        spans.append(float(np.ptp(problem.parts[0].record.time)))
+        spans.append(float(np.ptp(problem.terms[0].record.time)))
     assert spans[1] - spans[0] == pytest.approx(2.0 * (0.15 - 0.02), abs=0.02)

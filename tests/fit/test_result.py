@@ -30,10 +30,10 @@ def test_the_fitted_model_has_the_values_in_its_elements_and_as_first_guesses() 
 def test_the_runs_are_those_of_the_fitted_model() -> None:
     found = fit_log(FOUND)
     (run,) = found.simulate()
-    (part,) = found.problem.parts
+    (term,) = found.problem.terms
     model = found.fitted
     again = simulate(
-        list(model.elements), part.record.inputs, model.start, run.time, list(run.columns)
+        list(model.elements), term.record.inputs, model.start, run.time, list(run.columns)
     )
     for output, column in run.columns.items():
         assert again.columns[output] == pytest.approx(column, abs=1e-6)

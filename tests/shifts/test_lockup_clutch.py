@@ -21,7 +21,7 @@ from drivetwin.shifts.lockup_clutch import (
     refer_to_turbine,
     require_locked_converter,
 )
-from drivetwin.simulation.vehicle_parts import Converter
+from drivetwin.simulation.added_elements import Converter
 from tests.shifts.fixtures import Plan, make_card
 
 TIME = np.arange(0.0, 6.0, 0.02)

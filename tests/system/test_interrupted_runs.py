@@ -15,6 +15,7 @@ import pytest
 
 from drivetwin import _native
 from drivetwin.errors import SimulationError
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.batch import (
     Keep,
     Scenario,
@@ -29,7 +30,6 @@ from drivetwin.simulation.dual_clutch import (
 from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from drivetwin.simulation.network import Sine, Start, simulate
 from drivetwin.simulation.serialize import as_json
-from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.simulation.test_batch import MODEL, TIME, scenario, sets
 
 LATEST = 0.2
@@ -139,4 +139,6 @@ def to_plain(one: Scenario) -> Any:
     """A scenario as the core takes it."""
     inputs = {"engine torque": one.engine_torque, **one.pressures}
     samples = [(name, s.time, s.values, s.delay) for name, s in inputs.items()]
-    return (samples, []), build_start(MODEL, NO_PARTS, one.start, one.engine_torque, 0.0).to_core()
+    return (samples, []), build_start(
+        MODEL, NO_ADDED_ELEMENTS, one.start, one.engine_torque, 0.0
+    ).to_core()

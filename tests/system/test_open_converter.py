@@ -12,10 +12,10 @@ import pytest
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.simulation.added_elements import AddedElements
 from drivetwin.simulation.driveline import solve_steady_speed
 from drivetwin.simulation.driveline_run import DrivelineTask, simulate
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
-from drivetwin.simulation.vehicle_parts import VehicleParts
 from drivetwin.vehicle.card import load_card
 
 
@@ -51,10 +51,10 @@ def test_all_inertias_of_the_model_turn_behind_the_converter() -> None:
     }
     torque = Signal(np.array([0.0, 0.1, 0.5]), np.array([1545.0, 1545.0, 800.0]))
     start = replace(scenario.start(), engine_speed=1.2 * scenario.start().engine_speed)
-    parts = VehicleParts(front=scenario.converter)
+    added = AddedElements(front=scenario.converter)
 
     def simulate_behind(model: DualClutch) -> Trajectory:
-        return DrivelineTask(model, parts, torque, held, start, time).simulate()
+        return DrivelineTask(model, added, torque, held, start, time).simulate()
 
     ran = simulate_behind(model)
     # Without losses it is all one on which side of the input gear an inertia turns.

@@ -213,6 +213,26 @@ def test_private_words_are_found_as_files_folders_and_definitions() -> None:
     ]
 
 
+def test_private_words_are_found_within_identifiers_and_texts() -> None:
+    words = (
+        f"{PACKAGE}/*\tname\tage part\n"
+        f"{PACKAGE}/*\tphrase\ttold; age of the\n"
+        "docs/*\tphrase\tformed anew\n"
+    )
+    files = {
+        WORDS: words,
+        f"{PACKAGE}/a.py": "# a part of an age\nmessage = 0\nsensor.age = 1\nstages = MyPart()\n",
+        f"{PACKAGE}/b.toml": 'text = "The age\n  of the torque"\nuntold = 1\n',
+        "docs/a.md": "It is told.\n\nThe columns are Formed\nanew.\n",
+    }
+    assert sorted(faults(check_words, files)) == [
+        ("docs/a.md", 3),
+        (f"{PACKAGE}/a.py", 3),
+        (f"{PACKAGE}/a.py", 4),
+        (f"{PACKAGE}/b.toml", 1),
+    ]
+
+
 def test_an_unknown_kind_of_word_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown kind"):
         read_words("a\tb\tc\n")

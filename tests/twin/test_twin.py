@@ -317,5 +317,5 @@ def test_the_part_of_the_plant_is_kept(
     own = {k: Estimate(k, v, 0.0, Verdict.IDENTIFIED, "given") for k, v in values.items()}
     save_twin(tmp_path / "twin.toml", replace(twin, parameters={**twin.parameters, **own}))
     found = load_twin(tmp_path / "twin.toml")
-    assert found.part_values == kept
-    assert found.drop_part().part_values == {}
+    assert found.added_element_values == kept
+    assert found.drop_added_elements().added_element_values == {}

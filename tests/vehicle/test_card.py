@@ -110,7 +110,7 @@ def test_sensors_and_channels_go_by_role_in_si(tmp_path: Path) -> None:
     card = load(
         tmp_path,
         CARD + "[sensors.output_torque]\ngain_tolerance = 0.01\noffset_tolerance_Nm = 20\n"
-        "age_tolerance_ms = 2\n"
+        "delay_tolerance_ms = 2\n"
         "[sensors.input_speed]\noffset_tolerance_rpm = 30\n"
         "[sensors.pressure.B2]\noffset_tolerance_bar = 0.02\n"
         '[channels.pressure.B3]\nsource = "p3"\nunit = "bar"\n'

@@ -136,7 +136,7 @@ class ComparedShift:
             OperatingPoint(torque, speed),
             wheel_radius=1.0,
             horizon=last - first,
-            parts=twin.build_parts(begun.model),
+            added=twin.build_added_elements(begun.model),
         )
         signals = tuple(
             replace(
@@ -162,7 +162,7 @@ class ComparedShift:
         self, drivelines: Sequence[Driveline], paths: Sequence[InputPath]
     ) -> list[FloatArray]:
         """Return the samples (runs, n) of each signal; NaN in a run that fails."""
-        shift = replace(self.shift, model=drivelines[0].model, parts=drivelines[0].parts)
+        shift = replace(self.shift, model=drivelines[0].model, added=drivelines[0].added)
         scenarios = []
         for one, path in zip(drivelines, paths, strict=True):
             pressures = {name: each for name, each in self.inputs.items() if name != ENGINE_TORQUE}

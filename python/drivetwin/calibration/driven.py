@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Logged shifts together with the calibration that they were driven with.
 
-The commanded profile is the better input of a simulation: it has no noise, no sampling and no age,
-and what lies between it and the clutches is then one path of the inputs. A log has no channel for
+The commanded profile is the better input of a simulation: it has no noise, sampling or delay, and
+what lies between it and the clutches is then one path of the inputs. A log has no channel for
 it; but its pressures show the instant of the request, and whether they follow the profile at all.
 """
 
@@ -39,7 +39,7 @@ class DrivenShift:
     """A logged shift and the profiles that were commanded, on the clock of the log.
 
     Without `profiles` the shift is simulated from its logged torque and pressures. `request` [s] is
-    the instant of the request; `calibration` names the file of the profiles. `departure` is the RMS
+    the instant of the request; `calibration` names the file of the profiles. `misfit` is the RMS
     distance [Pa] of the logged pressures from the nearest profiles, None without any.
     """
 
@@ -47,7 +47,7 @@ class DrivenShift:
     profiles: Profiles | None = None
     request: float = 0.0
     calibration: str = ""
-    departure: float | None = None
+    misfit: float | None = None
 
 
 def match_profiles(
@@ -72,14 +72,14 @@ def match_profiles(
     if not found:
         return DrivenShift(logged)
     file = min(found, key=lambda one: found[one][1])
-    offset, departure = found[file]
+    offset, misfit = found[file]
     largest = max(float(np.max(one.values)) for _, one in pairs[file])
     noise = max(one.sigma for one in channels.values())
-    if departure > np.hypot(noise, _RAMPS * largest):
-        return DrivenShift(logged, departure=departure)
+    if misfit > np.hypot(noise, _RAMPS * largest):
+        return DrivenShift(logged, misfit=misfit)
     moved = Profiles(*(_move(one, offset) for one in candidates[file].signals.values()))
     request = offset + shift.request
-    return DrivenShift(logged, _follow_demand(moved, logged, request), request, file, departure)
+    return DrivenShift(logged, _follow_demand(moved, logged, request), request, file, misfit)
 
 
 def _follow_demand(profiles: Profiles, logged: LoggedShift, request: float) -> Profiles:

@@ -49,7 +49,7 @@ def simulate_nominal(maneuver: Maneuver, profiles: Profiles) -> Trajectory:
         maneuver.oncoming.name: profiles.oncoming,
     }
     inputs = (profiles.engine_torque, pressures, maneuver.build_start(), maneuver.time)
-    return DrivelineTask(maneuver.model, maneuver.parts, *inputs).simulate()
+    return DrivelineTask(maneuver.model, maneuver.added, *inputs).simulate()
 
 
 def _collect_loaded_slip(run: Trajectory) -> list[tuple[FloatArray, FloatArray]]:
@@ -61,6 +61,6 @@ def _collect_loaded_slip(run: Trajectory) -> list[tuple[FloatArray, FloatArray]]
     return found
 
 
-def _join(*parts: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    times, values = zip(*parts, strict=True)
+def _join(*added: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    times, values = zip(*added, strict=True)
     return np.concatenate(times), np.concatenate(values)

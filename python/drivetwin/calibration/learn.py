@@ -25,7 +25,7 @@ from drivetwin.calibration.driven import DrivenShift
 from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.vehicle_unknowns import (
-    PARTS,
+    ADDED_ELEMENTS,
     AddedUnknown,
     LearnedValue,
     VehicleUnknowns,
@@ -38,8 +38,8 @@ from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.optimize.gauss_newton import GaussNewtonSettings, OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import LEAD
+from drivetwin.simulation.added_elements import REFERENCE
 from drivetwin.simulation.driveline import Driveline
-from drivetwin.simulation.vehicle_parts import REFERENCE
 from drivetwin.twin.twin import CAPACITY_REFERENCE, Twin
 
 
@@ -113,7 +113,9 @@ def correct_twin(
         best = _sharpen(search.run())
     with scale_progress(0.6, 1.0):
         full = add_exact(twin, {REFERENCE: max(one.largest_torque for one in shifts)})
-        best = _try_parts(best, lambda more: build_unknowns(full, shift, spread, [*added, more]))
+        best = _try_added_elements(
+            best, lambda more: build_unknowns(full, shift, spread, [*added, more])
+        )
     z, found = best.point.values, best.problem
     first = np.maximum(np.zeros(problem.unknowns.count), problem.lower)
     covariance: FloatArray = np.linalg.inv(best.normal.information).astype(np.float64)
@@ -286,7 +288,7 @@ class LogsObjective:
     def _build(self, z: FloatArray) -> tuple[Driveline, InputPath]:
         twin = self.unknowns.build_twin(z, np.eye(z.size))
         model = twin.build_dual_clutch(self.unknowns.shift)
-        return Driveline(model, twin.build_parts(model)), InputPath.from_twin(twin)
+        return Driveline(model, twin.build_added_elements(model)), InputPath.from_twin(twin)
 
 
 Found = OptimizeResult[LogsObjective]
@@ -384,17 +386,17 @@ def _minimise(problem: LogsObjective, start: FloatArray, limit: float = np.inf) 
     return minimise(problem, ParameterVector(names, start), rough=True, limit=limit)
 
 
-def _try_parts(best: Found, build: Callable[[AddedUnknown], VehicleUnknowns]) -> Found:
-    """Add the part beside the dual clutch that the logs show, if any.
+def _try_added_elements(best: Found, build: Callable[[AddedUnknown], VehicleUnknowns]) -> Found:
+    """Add the element beside the dual clutch that the logs show, if any.
 
-    A part is added where the evidence for it is as large as it must be in an identification.
+    An element is added where the evidence for it is as large as it must be in an identification.
     """
-    present, chosen = best.problem.unknowns.twin.part_values, best
-    for name, part in PARTS.items():
+    present, chosen = best.problem.unknowns.twin.added_element_values, best
+    for name, added in ADDED_ELEMENTS.items():
         if name in present:
             continue
-        problem = replace(best.problem, unknowns=build(part))
-        start = np.append(best.point.values, _PART_START)
+        problem = replace(best.problem, unknowns=build(added))
+        start = np.append(best.point.values, _ADDED_START)
         if _predict_gain(best, problem, start) < LEAD:
             continue
         found = _minimise(problem, start)
@@ -404,14 +406,14 @@ def _try_parts(best: Found, build: Callable[[AddedUnknown], VehicleUnknowns]) ->
     return chosen
 
 
-_PART_START = 0.5
-"""Size of a part from which it is sought, in standard deviations of its prior."""
+_ADDED_START = 0.5
+"""Size of an added element from which it is sought, in standard deviations of its prior."""
 
 
 def _predict_gain(best: Found, problem: LogsObjective, start: FloatArray) -> float:
-    """Predict the gain of log likelihood by a part, whose size is the last of the values (m,).
+    """Predict the gain of log likelihood by an element, whose size is the last of the values (m,).
 
-    All other values follow it linearly. The simulation with a part takes far longer than that
+    All other values follow it linearly. The simulation with one takes far longer than that
     without, so that one run decides whether it is worth a search.
     """
     residual, slopes = best.normal.residuals[0], best.normal.slopes[0]

@@ -12,6 +12,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.input_path import DIRECT, InputPath
 from drivetwin.errors import InputError
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline import (
     CRANK,
     ENGINE,
@@ -26,7 +27,6 @@ from drivetwin.simulation.driveline import (
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Signal, State
 from drivetwin.simulation.network import Element, Start
 from drivetwin.simulation.shift_control import ControlledNetwork, ControlledUnit
-from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Maneuver:
 
     `wheel_radius` [m] converts the wheel's motion to the vehicle's. The gear is requested at
     `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s]. `path` leads from
-    profiles to the inputs that act. `parts` are those beside the dual clutch.
+    profiles to the inputs that act. `added` are the elements beside the dual clutch.
     """
 
     model: DualClutch
@@ -57,7 +57,7 @@ class Maneuver:
     horizon: float = 1.6
     step: float = 1e-3
     path: InputPath = DIRECT
-    parts: VehicleParts = NO_PARTS
+    added: AddedElements = NO_ADDED_ELEMENTS
 
     @cached_property
     def time(self) -> FloatArray:
@@ -67,12 +67,12 @@ class Maneuver:
     @property
     def driveline(self) -> Driveline:
         """Nominal driveline."""
-        return Driveline(self.model, self.parts)
+        return Driveline(self.model, self.added)
 
     @cached_property
     def elements(self) -> list[Element]:
         """Network of the nominal driveline."""
-        return build_driveline(self.model, self.parts)
+        return build_driveline(self.model, self.added)
 
     @cached_property
     def body(self) -> VehicleBody:
@@ -118,7 +118,7 @@ class Maneuver:
         wheel = output / model.i_f
         torque = model.compute_steady_torque(self.point.engine_torque, ratio, wheel)
         speed = self.point.engine_speed
-        twist = compute_twist(model, driveline.parts, torque)
+        twist = compute_twist(model, driveline.added, torque)
         return State(speed, output, wheel, twist, (self.offgoing.name,))
 
     @cached_property
@@ -130,13 +130,13 @@ class Maneuver:
         """Return the start of the network of a driveline, with the nominal speeds of the gear."""
         state = replace(self.build_start(), twist=self.build_start(driveline).twist)
         held = Signal(self.time[:2], np.full(2, self.point.engine_torque))
-        return build_start(driveline.model, driveline.parts, state, held, 0.0)
+        return build_start(driveline.model, driveline.added, state, held, 0.0)
 
     def build_controlled(
         self, units: Sequence[ControlledUnit], sets: Mapping[str, FloatArray]
     ) -> ControlledNetwork:
         """Return made units of the nominal network, with values (units,) of numbers by path."""
-        engine = ENGINE if self.parts.front is None else CRANK
+        engine = ENGINE if self.added.front is None else CRANK
         return ControlledNetwork(self.elements, self.start, units, sets, speeds=(engine, OUTPUT))
 
     def compute_acceleration(self, torque: float, ratio: float) -> float:

@@ -171,7 +171,7 @@ def collect_scenarios(maneuver: Maneuver, drivelines: Sequence[Driveline]) -> Sc
     drums and axes of tables are those of the maneuver.
     """
     base = _describe(maneuver, maneuver.driveline)
-    tables = [_describe(maneuver, one.share_axes(maneuver.parts)) for one in drivelines]
+    tables = [_describe(maneuver, one.share_axes(maneuver.added)) for one in drivelines]
     sets = {
         path: np.array([table[path] for table in tables])
         for path, value in base.items()
@@ -185,7 +185,7 @@ def _describe(maneuver: Maneuver, driveline: Driveline) -> dict[str, float]:
     start = maneuver.build_network_start(driveline)
     own = {
         path: value
-        for one in build_driveline(driveline.model, driveline.parts)
+        for one in build_driveline(driveline.model, driveline.added)
         for path, value in _iterate_numbers(one["name"], one)
         if not path.endswith(_DESIGN)
     }
@@ -249,7 +249,7 @@ class KnownDraws:
 class TwinDraws:
     """Draws of a twin: parameters and friction laws by their joint covariance, and made units.
 
-    Parts beside the dual clutch are drawn too; parameters without an interval keep their values.
+    Elements beside the dual clutch are drawn too; parameters without an interval keep their values.
 
     The covariance is the total one, with sensor tolerances and effects. The friction is that of
     `oil`, by a slope of each type and a temperature of each unit.
@@ -272,7 +272,7 @@ class TwinDraws:
         def make(random: np.random.Generator) -> Driveline:
             more = self.spread.oil_temperature * float(random.standard_normal())
             unit = scale_units(self.oil.warm(model, slope, more), self.spread, random)
-            return Driveline(unit, self.twin.build_parts(unit, known.to_named(values)))
+            return Driveline(unit, self.twin.build_added_elements(unit, known.to_named(values)))
 
         return make
 
@@ -287,7 +287,10 @@ class TwinDraws:
     @cached_property
     def drawn_ids(self) -> list[str]:
         """Ids of the covariance that the driveline of the shift depends on."""
-        twin, used = self.twin, {*self.twin.list_model_ids(self.shift), *self.twin.part_values}
+        twin, used = (
+            self.twin,
+            {*self.twin.list_model_ids(self.shift), *self.twin.added_element_values},
+        )
         gear = twin.select_inertia_gear(self.shift)
         used -= {name for name in used if name.startswith("J_prime_")}
         used.add(f"J_prime_{gear}")

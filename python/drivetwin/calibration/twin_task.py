@@ -74,8 +74,8 @@ def build_task(twin: Twin, request: Request) -> Task:
     oil = build_oil_state(twin, request)
     model = oil.warm(twin.build_dual_clutch(shift))
     point = _choose_point(twin, request)
-    parts, path = twin.build_parts(model), InputPath.from_twin(twin)
-    maneuver = Maneuver(model, point, request.wheel_radius, path=path, parts=parts)
+    added, path = twin.build_added_elements(model), InputPath.from_twin(twin)
+    maneuver = Maneuver(model, point, request.wheel_radius, path=path, added=added)
     check_gears(maneuver)
     units = None
     if request.policy.commands_actuators:

@@ -18,8 +18,8 @@ from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, V
 from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.vehicle_parts import PROGRESSION, TYRE_SLIP
-from drivetwin.twin.distribution import collect_covariance, has_possible_parts
+from drivetwin.simulation.added_elements import PROGRESSION, TYRE_SLIP
+from drivetwin.twin.distribution import collect_covariance, has_possible_elements
 from drivetwin.twin.friction_law import (
     build_partner_spread,
     compute_friction_std,
@@ -161,11 +161,11 @@ class AddedUnknown:
     lower: float = -np.inf
 
 
-PARTS = {
+ADDED_ELEMENTS = {
     TYRE_SLIP: AddedUnknown(TYRE_SLIP, 0.0, 0.005, 2e-4),
     PROGRESSION: AddedUnknown(PROGRESSION, 0.0, 0.10),
 }
-"""Sizes of parts that logs can add to a twin, by id.
+"""Sizes of elements that logs can add to a twin, by id.
 
 Their standard deviations are the upper ends of typical ranges: a slip of 0.1 to 0.5 % at the
 traction of a shift, and rubber couplings that stiffen by a tenth. Less slip than the lower bound
@@ -207,7 +207,7 @@ class VehicleUnknowns:
             for name, value in zip(self.ids, values, strict=False)
             if get_parameter_spec(name).lower >= 0.0
         )
-        above = above and has_possible_parts(dict(zip(self.ids, values.tolist(), strict=False)))
+        above = above and has_possible_elements(dict(zip(self.ids, values.tolist(), strict=False)))
         return above and all(one.is_possible(values[part]) for one, part in self._pair_friction())
 
     def build_twin(self, z: FloatArray, covariance: FloatArray) -> Twin:

@@ -58,7 +58,7 @@ _PERIODS = 12
 """Most periods tried [count]: cost of work."""
 
 
-class FillKind(StrEnum):
+class Interpolation(StrEnum):
     """Interpolation between measured samples."""
 
     LINEAR = "linear"
@@ -71,10 +71,10 @@ class Filling:
     """Measured samples of a filled channel: instants `time` [s] (m,) and `values` (m,).
 
     `period` [s] is the median distance of the knots, `step` [s] that of the record. Both arrays
-    are empty where the knots could not be found (kind UNKNOWN).
+    are empty where the knots could not be found (`interpolation` UNKNOWN).
     """
 
-    kind: FillKind
+    interpolation: Interpolation
     period: float
     step: float
     time: FloatArray
@@ -107,7 +107,7 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     step = compute_median_step(time)
     lines = find_corners(time, values)
     if lines is not None:
-        return Filling(FillKind.LINEAR, lines.period, step, lines.time, lines.values)
+        return Filling(Interpolation.LINEAR, lines.period, step, lines.time, lines.values)
     for part in _list_windows(time, values):
         raster = _find_raster(time[part], values[part])
         filling = None if raster is None else _extend_raster(time, values, raster)
@@ -116,9 +116,9 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     for stride in _STRIDES if len(list_blurs(time)) > 1 else ():
         lines = find_corners(time[::stride], values[::stride])
         if lines is not None:
-            return Filling(FillKind.LINEAR, lines.period, step, lines.time, lines.values)
+            return Filling(Interpolation.LINEAR, lines.period, step, lines.time, lines.values)
     nothing = np.empty(0)
-    unknown = Filling(FillKind.UNKNOWN, np.nan, step, nothing, nothing)
+    unknown = Filling(Interpolation.UNKNOWN, np.nan, step, nothing, nothing)
     return unknown if has_short_lines(time, values) else None
 
 
@@ -148,13 +148,13 @@ def _extend_raster(time: FloatArray, values: FloatArray, found: KnotRaster) -> F
     None where the rest of the record has no such knots.
     """
     step = compute_median_step(time)
-    kind = FillKind.LINEAR if found.is_linear else FillKind.CUBIC
+    interpolation = Interpolation.LINEAR if found.is_linear else Interpolation.CUBIC
     if found.on_rows:
         count = np.round((time - found.start) / found.period)
         at = np.abs(time - found.start - count * found.period) < 0.5 * step
-        return Filling(kind, found.period, step, time[at], values[at])
+        return Filling(interpolation, found.period, step, time[at], values[at])
     knots, heights = extend_knots(time, values, found)
-    return Filling(kind, found.period, step, knots, heights) if knots.size else None
+    return Filling(interpolation, found.period, step, knots, heights) if knots.size else None
 
 
 def _is_cycle(values: FloatArray) -> bool:

@@ -296,13 +296,13 @@ def parse_grid(text: str) -> Grid:
 
     `oil=40:100:3` (°C) adds an axis of the oil temperature.
 
-    Raises InputError for another form.
+    Raises InputError for another format.
     """
     from drivetwin.calibration.operating_map import Grid
 
     axes = (rf"{name}=([^:,]+):([^:,]+):(\d{{1,2}})" for name in ("torque", "speed"))
-    form = re.compile(",".join(axes) + r"(?:,oil=([^:,]+):([^:,]+):(\d{1,2}))?")
-    found = form.fullmatch(text.replace(" ", ""))
+    pattern = re.compile(",".join(axes) + r"(?:,oil=([^:,]+):([^:,]+):(\d{1,2}))?")
+    found = pattern.fullmatch(text.replace(" ", ""))
     try:
         numbers = [] if found is None else [float(one) for one in found.groups() if one]
     except ValueError:
@@ -378,9 +378,9 @@ def _write_results(
     )
     name = f"{twin.name} {label}"
     content = collect_calibration(found, name, mapped)
-    form = None if request.template is None else read_template(request.template)
-    if form is not None:
-        content = apply_template(content, form)
+    template = None if request.template is None else read_template(request.template)
+    if template is not None:
+        content = apply_template(content, template)
     with write_atomically(request.output) as folder:
         write_calibration_file(
             folder / CALIBRATION, build_calibration_file(found, provenance, front, mapped)
@@ -388,8 +388,8 @@ def _write_results(
         certificate = build_certificate_document(found)
         write_text(folder / CERTIFICATE, json.dumps(certificate, indent=2, allow_nan=False) + "\n")
         for kind in (ParameterFormat.CSV, ParameterFormat.DCM, ParameterFormat.CDFX):
-            if form is not None:
-                require_labels(content, form, kind)
+            if template is not None:
+                require_labels(content, template, kind)
             write_parameters(content, folder / f"calibration.{kind.value}", kind)
         page = render_calibration(found, f"Calibration of {name}", shown, front, mapped)
         write_text(folder / REPORT, page)

@@ -98,10 +98,10 @@ def list_log_findings(found: Correction | None) -> tuple[Finding, ...]:
             Code.LOG_FOLLOWS_NO_CALIBRATION,
             "",
             Where(file=one.logged.log.source, time=one.logged.shift.before[1]),
-            departure=Number(one.departure, "Pa"),
+            misfit=Number(one.misfit, "Pa"),
         )
         for one in (() if found is None else found.shifts)
-        if one.profiles is None and one.departure is not None
+        if one.profiles is None and one.misfit is not None
     )
 
 

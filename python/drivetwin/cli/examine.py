@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from drivetwin.twin.twin import Twin
 
 SUGGESTIONS, BOOTSTRAP = "suggestions.json", "bootstrap.json"
-FRICTION, DEPARTURES = "friction.json", "departures.json"
+FRICTION, DEPENDENCES = "friction.json", "dependences.json"
 
 
 class Examine(Request, command="examine"):
@@ -50,7 +50,7 @@ class Examine(Request, command="examine"):
     friction: FrictionShape | None = option(
         "Estimate friction over slip as a curve of this shape instead of the Stribeck law."
     )
-    departures: bool = flag("Estimate drag of the open clutches, and friction over pressure.")
+    dependences: bool = flag("Estimate drag of the open clutches, and friction over pressure.")
     output: Path | None = output_folder("Folder for the files.")
 
 
@@ -60,7 +60,7 @@ def examine(request: Examine, *, as_json: bool) -> None:
     The log is first identified by the likelihood method. The command lists the experiments that
     narrow weak, not identifiable and least known parameters, with the expected intervals. Options
     add the profile likelihood, a parametric bootstrap, friction curves of free or monotone shape
-    with a twin, and departures from the friction law. With a model file the log is fitted as by
+    with a twin, and dependences of friction and drag. With a model file the log is fitted as by
     'drivetwin fit', and all but the last two apply.
     """
     from drivetwin.cli.identify_run import IdentifyOptions, run_identification
@@ -115,11 +115,11 @@ def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
     yield from _iterate_interval_answers(found, request, compute_profile, bootstrap)
     if request.friction is not None:
         yield _identify_friction(outcome, request.friction)
-    if request.departures:
-        with show_step("looking for what departs from the friction law"):
+    if request.dependences:
+        with show_step("estimating drag and friction over pressure"):
             seen = estimate_dependences(found)
         yield Answer(
-            DEPARTURES, analysis_files.format_dependences(seen), [_build_dependence_table(seen)]
+            DEPENDENCES, analysis_files.format_dependences(seen), [_build_dependence_table(seen)]
         )
 
 
@@ -201,8 +201,8 @@ def _build_dependence_table(found: tuple[Dependence, ...]) -> TableBlock:
         for one in found
     ]
     return make_table(
-        "Departures from the friction law",
-        ("element", "departure", ("value", ".2g"), ("± 95 %", ".1g"), "unit", ""),
+        "Dependences that the friction law lacks",
+        ("element", "dependence", ("value", ".2g"), ("± 95 %", ".1g"), "unit", ""),
         rows,
     )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin export TWIN --to FORM`: the twin for other programs."""
+"""`drivetwin export TWIN --to FORMAT`: the twin for other programs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Export(ExportOptions, TwinInput, command="export"):
     """Arguments of `export`."""
 
     output: Path | None = output_file(
-        "File, or folder for c; default: ./TWIN.FORM.", "PATH", shape=Shape.EITHER
+        "File, or folder for c; default: ./TWIN.FORMAT.", "PATH", shape=Shape.EITHER
     )
     shift: str | None = option(
         "For models: shift, such as 2-3; default: the first upshift.", metavar="GEAR-GEAR"
@@ -72,12 +72,12 @@ def export(request: Export, *, as_json: bool) -> None:
 
 
 def _report_reduction(made: ExportedModel, as_json: bool) -> dict[str, object]:
-    """Report the parts that C and FMU leave out, and their error in the shift of the log."""
+    """Report the elements that C and FMU leave out, and their error in the shift of the log."""
     subject, experiment = made.subject, made.experiment
-    if not subject.part_names:
+    if not subject.added_element_names:
         return {}
-    text = f"left out: {subject.part_names}"
-    listed: dict[str, object] = {"left_out": subject.part_names}
+    text = f"left out: {subject.added_element_names}"
+    listed: dict[str, object] = {"left_out": subject.added_element_names}
     if experiment is None:
         text += "; give a shift with --log to see the error"
     else:

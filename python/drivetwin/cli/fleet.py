@@ -140,7 +140,7 @@ def estimate(request: EstimateFleet, *, as_json: bool) -> None:
         missing = list_missing_estimates(opened, found, request.parameter)
         blocks = build_estimate_blocks(opened, found, missing, request.store)
     if as_json:
-        print_json({"estimates": [one.to_document() for one in found], "untold": missing})
+        print_json({"estimates": [one.to_document() for one in found], "missing": missing})
         return
     print_blocks(blocks)
 

@@ -56,7 +56,7 @@ class Synthesize(Bench, command="synth"):
         "Inertia of each brake drum in the gearbox scenarios; default: 0.05.", metavar="KGM2"
     )
     effect: tuple[str, ...] = option(
-        "Departure from the dual-clutch model, repeatable; units and shares are those of "
+        "Effect that the dual-clutch model lacks, repeatable; units and shares are those of "
         f"docs/howto/synthetic-log.md: {', '.join(EffectId)}.",
         metavar="NAME=SIZE",
         default=(),

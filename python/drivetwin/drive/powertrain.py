@@ -20,8 +20,8 @@ from drivetwin.channels.units import BAR, IN_BAR, IN_RPM, RPM
 from drivetwin.errors import CardError, suggest_spelling
 from drivetwin.gearbox import Gearbox
 from drivetwin.gearbox.spec import Capacity
+from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.dual_clutch import FloatArray, RoadLoad, Stribeck
-from drivetwin.simulation.vehicle_parts import Converter
 from drivetwin.vehicle.converter import ConverterTable, Curve
 
 

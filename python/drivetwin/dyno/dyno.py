@@ -26,9 +26,9 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     compute_friction_work,
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import FloatArray, Signal, Trajectory
-from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 from drivetwin.vehicle.effects import EffectId
 
 _ROUNDS = 30
@@ -289,11 +289,11 @@ def _simulate(
 ) -> tuple[Trajectory, dict[str, Signal]]:
     """The exact motion at `time`, and by role what it does not hold: inputs, engine speed."""
     given = (inputs.engine_torque, inputs.pressures, scenario.start(), time)
-    parts = VehicleParts(front=scenario.converter) if scenario.converter else NO_PARTS
+    added = AddedElements(front=scenario.converter) if scenario.converter else NO_ADDED_ELEMENTS
     if scenario.plant is not None:
         trajectory = scenario.plant.simulate(scenario.model, *given)
     else:
-        trajectory = DrivelineTask(scenario.model, parts, *given).simulate()
+        trajectory = DrivelineTask(scenario.model, added, *given).simulate()
     speeds = {}
     if trajectory.crank_speed is not None:
         speeds["engine_speed"] = Signal(time, trajectory.crank_speed)

@@ -22,7 +22,7 @@ _KEY = Where(key="effect")
 def parse_effects(texts: Sequence[str]) -> dict[EffectId, float]:
     """Parse texts `NAME=SIZE`, such as `tyre_slip=0.004`.
 
-    Raises InputError for another form, a repeated or unknown name, or an impossible size.
+    Raises InputError for another format, a repeated or unknown name, or an impossible size.
     """
     return check_effects(parse_sizes(texts, "effect"))
 

@@ -13,9 +13,9 @@ from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.actuators import Actuator, ControlledActuator, Program
 from drivetwin.dyno.plant import Plant
 from drivetwin.errors import InputError, Where
+from drivetwin.simulation.added_elements import OpenConverter
 from drivetwin.simulation.driveline import solve_steady_speed
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, ShiftElement, State
-from drivetwin.simulation.vehicle_parts import OpenConverter
 
 LOOKS = 20
 """Instants per averaging window; the error of the mean falls with their square."""

@@ -34,8 +34,8 @@ from drivetwin.dyno.plant import Plant, build_form, build_plant
 from drivetwin.dyno.scenario import HeldGear, Scenario, Sensor, TorqueReduction
 from drivetwin.errors import InputError, Where
 from drivetwin.gearbox import load_gearbox
+from drivetwin.simulation.added_elements import OpenConverter
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
-from drivetwin.simulation.vehicle_parts import OpenConverter
 from drivetwin.vehicle.converter import ConverterTable
 
 Table = Mapping[str, Any]

@@ -8,9 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
+from drivetwin.simulation.added_elements import (
+    NO_ADDED_ELEMENTS,
+    AddedElements,
+    describe_added_elements,
+)
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, State
-from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts, describe_parts
 from drivetwin.twin.twin import Twin, build_nominal_shift
 
 DEFAULT_ENGINE_SPEED = 150.0
@@ -28,21 +32,21 @@ class Subject:
     """Origin of the numbers, one line."""
     delays: InputDelays = ACTING_INPUTS
     """Delays between the inputs of a log and the acting inputs."""
-    parts: VehicleParts = NO_PARTS
-    """Parts beside the model."""
-    part_names: str = ""
-    """Names of the parts in words."""
+    added: AddedElements = NO_ADDED_ELEMENTS
+    """Elements beside the model."""
+    added_element_names: str = ""
+    """Names of the added elements in words."""
 
     def reduce(self) -> Subject:
         """Return the dual clutch alone, as C and FMU hold it; the note names what is left out."""
-        if self.parts is NO_PARTS:
+        if self.added is NO_ADDED_ELEMENTS:
             return self
         notes = [self.note] if self.note else []
-        note = "; ".join([*notes, f"without {self.part_names}"])
-        return replace(self, parts=NO_PARTS, part_names="", note=note)
+        note = "; ".join([*notes, f"without {self.added_element_names}"])
+        return replace(self, added=NO_ADDED_ELEMENTS, added_element_names="", note=note)
 
     def compute_reduction_error(self, time: FloatArray, inputs: FloatArray) -> float:
-        """Compute the largest error of the output torque by the parts that `reduce` leaves out.
+        """Compute the largest error of the output torque by the elements that `reduce` leaves out.
 
         Parameters
         ----------
@@ -60,8 +64,8 @@ class Subject:
         names = (one.name for one in self.model.elements)
         acting = dict(zip(names, pressures, strict=True))
         whole, reduced = (
-            DrivelineTask(self.model, parts, torque, acting, self.start, time).simulate()
-            for parts in (self.parts, NO_PARTS)
+            DrivelineTask(self.model, added, torque, acting, self.start, time).simulate()
+            for added in (self.added, NO_ADDED_ELEMENTS)
         )
         error = np.max(np.abs(reduced.shaft_torque - whole.shaft_torque))
         return float(error / np.max(np.abs(whole.shaft_torque)))
@@ -83,8 +87,8 @@ def build_subject(twin: Twin, gears: tuple[str, str] | None = None) -> Subject:
         start=compute_steady_start(model, shift.offgoing, _compute_usual_speed(twin)),
         note=build_note(twin, delays),
         delays=delays,
-        parts=twin.build_parts(model),
-        part_names=describe_parts(twin.part_values),
+        added=twin.build_added_elements(model),
+        added_element_names=describe_added_elements(twin.added_element_values),
     )
 
 

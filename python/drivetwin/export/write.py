@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class ExportOptions(Request):
     """Target of an export and its options."""
 
-    to: Target = option("Form of the export.", default=REQUIRED)
+    to: Target = option("Format of the export.", default=REQUIRED)
     names: Names = option(
         "For parameter files: naming convention of the parameters.", default=Names.DRIVETWIN
     )
@@ -76,7 +76,7 @@ def write_export(
 
 
 def _write_parameters(twin: Twin, options: ExportOptions, path: Path) -> ParameterSet:
-    """Write a parameter file, in the form of a template if one is given; return its contents."""
+    """Write a parameter file, in the layout of a template if one is given; return its contents."""
     from drivetwin.drive import load_powertrain
     from drivetwin.export.parameters.files import ParameterFormat, write_parameters
     from drivetwin.export.parameters.of_twin import collect_parameters
@@ -87,9 +87,9 @@ def _write_parameters(twin: Twin, options: ExportOptions, path: Path) -> Paramet
     content = collect_parameters(twin, options.names, converter)
     kind = ParameterFormat(options.to.value)
     if options.template is not None:
-        form = read_template(options.template)
+        template = read_template(options.template)
         unvalued = [one.id for one in twin.parameters.values() if one.value is None]
-        content = apply_template(content, form, unvalued)
-        require_labels(content, form, kind)
+        content = apply_template(content, template, unvalued)
+        require_labels(content, template, kind)
     write_parameters(content, path, kind)
     return content

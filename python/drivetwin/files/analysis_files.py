@@ -75,12 +75,12 @@ def format_friction(one: ShapedFriction) -> str:
 
 
 def format_dependences(found: tuple[Dependence, ...]) -> str:
-    """`departures.json`: drag of open clutches, and μ that goes with pressure or temperature."""
+    """`dependences.json`: drag of open clutches, and μ that goes with pressure or temperature."""
     names = ("kind", "element", "value", "std", "plausible", "text")
     rows = [
         {name: getattr(one, name) for name in names} | {"unit": UNITS[one.kind]} for one in found
     ]
-    return _format_json({"departures": rows})
+    return _format_json({"dependences": rows})
 
 
 def _format_json(content: dict[str, Any]) -> str:

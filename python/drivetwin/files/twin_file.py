@@ -39,7 +39,7 @@ from drivetwin.files.records import (
     read_record,
 )
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.simulation.vehicle_parts import Converter
+from drivetwin.simulation.added_elements import Converter
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from drivetwin.vehicle.card import RATIO_TOLERANCE
 

@@ -98,16 +98,16 @@ def _iterate_refits(found: ModelFit, count: int, seed: int) -> Iterator[list[flo
 
 def _draw_problem(found: ModelFit, rng: np.random.Generator) -> Problem:
     """Draw the problem of recordings with new noise and new priors."""
-    parts = tuple(_draw_part(part, found, rng) for part in found.problem.parts)
+    terms = tuple(_draw_term(term, found, rng) for term in found.problem.terms)
     prior = draw_prior(found.problem.prior, found.minimum.point.values, rng)
-    return replace(found.problem, parts=parts, prior=prior)
+    return replace(found.problem, terms=terms, prior=prior)
 
 
-def _draw_part(part: NetworkTerm, found: ModelFit, rng: np.random.Generator) -> NetworkTerm:
+def _draw_term(term: NetworkTerm, found: ModelFit, rng: np.random.Generator) -> NetworkTerm:
     """Draw one recording: exact outputs of the expected inputs, then noise on all."""
-    record = part.record
-    run = part.simulate(found.minimum.point)
-    columns = {name: run.columns[output] for name, output in part.plant.outputs.items()}
+    record = term.record
+    run = term.simulate(found.minimum.point)
+    columns = {name: run.columns[output] for name, output in term.plant.outputs.items()}
     exact: FloatArray = record.sample(columns)
     ends = np.cumsum([out.values.size for out in record.outputs])[:-1]
     drawn = np.split(exact + record.sigma * rng.standard_normal(record.size), ends)
@@ -122,7 +122,7 @@ def _draw_part(part: NetworkTerm, found: ModelFit, rng: np.random.Generator) -> 
         inputs[name] = replace(signal, values=driving)
         held_back[name] = read - driving
     made = replace(record, outputs=outputs, inputs=inputs, held_back=held_back, fast=held_back)
-    return NetworkTerm.from_sensor_noise(part.plant, made)
+    return NetworkTerm.from_sensor_noise(term.plant, made)
 
 
 def compute_profile(found: ModelFit, unknown: str) -> Profile:

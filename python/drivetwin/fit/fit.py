@@ -87,7 +87,7 @@ def build_problem(
     for one in sought:
         found.add(one.name, one.start, one.spread, one.limits)
     plain = Plant(model.elements, {}, model.start, model.outputs, sought)
-    parts = []
+    terms = []
     for number, recording in enumerate(recordings, start=1):
         _require_inputs(model, recording)
         names = list_starts(model.start, model.elements)
@@ -104,13 +104,13 @@ def build_problem(
             known = guess.priors[name]
             limits = (-np.inf, np.inf)
             found.add(plant.get_start_name(name), known.value, known.std, limits)
-        parts.append(NetworkTerm.from_sensor_noise(plant, record))
+        terms.append(NetworkTerm.from_sensor_noise(plant, record))
     prior = Prior.from_independent(len(found.names), found.priors)
     lower, upper = np.array(found.limits).T
     point = ParameterVector(tuple(found.names), np.array(found.values))
-    for part in parts:
-        part.simulate(point)  # raises InputError for a start or output that the network lacks
-    return LikelihoodObjective(tuple(parts), prior, lower, upper), point, sought
+    for term in terms:
+        term.simulate(point)  # raises InputError for a start or output that the network lacks
+    return LikelihoodObjective(tuple(terms), prior, lower, upper), point, sought
 
 
 def _build_plant(
@@ -227,7 +227,7 @@ def predict(found: ModelFit, recordings: Sequence[Recording]) -> tuple[HeldOut, 
                 "a recording that was held out cannot be simulated with the values of the fit",
                 "check that it is of the same driveline, and its start",
             )
-        part = end.problem.parts[0]
+        term = end.problem.terms[0]
         cost = end.normal.cost - prior.compute_prior_cost(end.point.values)
-        held.append(HeldOut(part.compare(end.point), cost / end.problem.size))
+        held.append(HeldOut(term.compare(end.point), cost / end.problem.size))
     return tuple(held)

@@ -53,7 +53,7 @@ FIT_GATE = FitGateSettings()
 
 
 def find_failures(
-    parts: Sequence[NetworkTerm],
+    terms: Sequence[NetworkTerm],
     residuals: Sequence[FloatArray],
     fits: Sequence[Mapping[str, SignalFit]],
     chi2: float,
@@ -61,23 +61,23 @@ def find_failures(
     """Find recordings and outputs that the simulation does not explain."""
     if chi2 > FIT_GATE.plausible_chi2:
         yield report(Code.RESIDUAL_UNEXPLAINED, chi2=chi2)
-    for part, residual, fit in zip(parts, residuals, fits, strict=True):
-        where = f" of {part.label}" if part.label else ""
-        for out, _, white in split_whitened(part, residual):
+    for term, residual, fit in zip(terms, residuals, fits, strict=True):
+        where = f" of {term.label}" if term.label else ""
+        for out, _, white in split_whitened(term, residual):
             if float(np.sqrt(np.mean(white**2))) > FIT_GATE.largest_error:
                 percent = fit[out.name].fit_percent
                 yield report(Code.SIMULATION_MISSES, channel=out.name + where, fit=percent)
 
 
 def find_doubts(
-    parts: Sequence[NetworkTerm],
+    terms: Sequence[NetworkTerm],
     fits: Sequence[Mapping[str, SignalFit]],
     failures: Sequence[Finding],
 ) -> Iterator[Finding]:
     """Find outputs of which the simulation explains less than half, beside the `failures`."""
     failed = {one.names["channel"] for one in failures if one.code is Code.SIMULATION_MISSES}
-    for part, fit in zip(parts, fits, strict=True):
-        where = f" of {part.label}" if part.label else ""
+    for term, fit in zip(terms, fits, strict=True):
+        where = f" of {term.label}" if term.label else ""
         for name, one in fit.items():
             if one.fit_percent < FIT_GATE.least_fit and name + where not in failed:
                 code = Code.SIMULATION_NOISY
@@ -167,8 +167,8 @@ class ModelFit:
     @cached_property
     def fitted(self) -> NetworkModel:
         """Model with the values at the minimum in place of the first guesses."""
-        part = self.problem.parts[0]
-        task = part.plant.build_task(self.minimum.point, part.record.inputs, part.record.time[:2])
+        term = self.problem.terms[0]
+        task = term.plant.build_task(self.minimum.point, term.record.inputs, term.record.time[:2])
         outputs: list[Output] = [("speed", name) for name in self.model.start.speeds]
         run = simulate(task.elements, task.inputs, task.start, task.time, outputs)
         speeds = {output[1]: float(run.columns[output][0]) for output in outputs}
@@ -184,7 +184,7 @@ class ModelFit:
 
     def simulate(self) -> tuple[NetworkRun, ...]:
         """Simulate every recording at the minimum, on its grid."""
-        return tuple(part.simulate(self.minimum.point) for part in self.problem.parts)
+        return tuple(term.simulate(self.minimum.point) for term in self.problem.terms)
 
 
 def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMinimum) -> ModelFit:
@@ -198,9 +198,9 @@ def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMi
         estimates[one.name] = _judge(one, float(coordinate), float(std))
         ends = coordinate + Z95 * std * np.array([-1.0, 1.0])
         intervals[one.name] = (one.to_value(float(ends[0])), one.to_value(float(ends[1])))
-    agreement = tuple(part.compare(minimum.point) for part in problem.parts)
-    failures = tuple(find_failures(problem.parts, minimum.normal.residuals, agreement, chi2))
-    doubts = find_doubts(problem.parts, agreement, failures)
+    agreement = tuple(term.compare(minimum.point) for term in problem.terms)
+    failures = tuple(find_failures(problem.terms, minimum.normal.residuals, agreement, chi2))
+    doubts = find_doubts(problem.terms, agreement, failures)
     findings = (*failures, *doubts, *_collect_findings(minimum, sought))
     estimates = apply_errors(estimates, findings)
     return ModelFit(
@@ -240,7 +240,7 @@ def _collect_findings(
 ) -> tuple[Finding, ...]:
     """Test the residuals, and name the directions that the recordings do not identify."""
     state = _State(minimum.problem, minimum.normal)
-    labels = [part.label for part in minimum.problem.parts]
+    labels = [term.label for term in minimum.problem.terms]
     sizes = np.ones(len(minimum.point.names))
     sizes[: len(sought)] = [_get_size(one, minimum.point) for one in sought]
     shown = {k: one.name for k, one in enumerate(sought)}

@@ -133,11 +133,11 @@ def search(
 
 def _coarsen(problem: Problem) -> Problem:
     """Return the problem of fewer samples, for the way to the minimum."""
-    parts = [
-        NetworkTerm.from_sensor_noise(part.plant, part.record.coarsen(FIT_SEARCH.points))
-        for part in problem.parts
+    terms = [
+        NetworkTerm.from_sensor_noise(term.plant, term.record.coarsen(FIT_SEARCH.points))
+        for term in problem.terms
     ]
-    return replace(problem, parts=tuple(parts))
+    return replace(problem, terms=tuple(terms))
 
 
 class _Attempts:
@@ -183,7 +183,7 @@ class _Attempts:
 
 
 def _polish(problem: Problem, point: ParameterVector) -> OptimizeResult[Problem]:
-    """Minimise from a point near the minimum, with the weighting formed anew there."""
+    """Minimise from a point near the minimum, with the weighting recomputed there."""
     found = minimise(problem.update_weighting(point), point, settings=BENT)
     if found is None:
         raise IdentificationError(
@@ -233,8 +233,8 @@ class _Screen:
         else:
             draws = self._draw_about_best(number)
         scores = np.zeros(len(draws))
-        for part in self.problem.parts:
-            scores += _compute_scores(part, self.start, self.sought, draws)
+        for term in self.problem.terms:
+            scores += _compute_scores(term, self.start, self.sought, draws)
         self.draws = np.concatenate([self.draws, draws])
         self.scores = np.concatenate([self.scores, scores])
         order = np.argsort(scores, kind="stable")[: FIT_SEARCH.round_starts]
@@ -277,13 +277,13 @@ def _get_spread(one: SoughtNumber) -> float:
 
 
 def _compute_scores(
-    part: NetworkTerm, start: ParameterVector, sought: Sequence[SoughtNumber], draws: FloatArray
+    term: NetworkTerm, start: ParameterVector, sought: Sequence[SoughtNumber], draws: FloatArray
 ) -> FloatArray:
     """Compute the misfit of each draw: -2 log likelihood with a noise of each output that is
     unknown beyond that of its sensor; infinite where the run fails."""
-    task = part.plant.build_task(start, part.record.inputs, part.record.time)
-    measured = np.full((len(task.outputs), part.record.time.size), np.nan)
-    for row, out in zip(measured, part.record.outputs, strict=True):
+    task = term.plant.build_task(start, term.record.inputs, term.record.time)
+    measured = np.full((len(task.outputs), term.record.time.size), np.nan)
+    for row, out in zip(measured, term.record.outputs, strict=True):
         row[out.place] = out.values
     sets = {
         path: factor * (np.exp(column) if one.is_positive else column)
@@ -296,7 +296,7 @@ def _compute_scores(
         task.elements, [scenario], task.time, task.outputs, sets, keep=list(measured)
     )
     score = np.zeros(len(draws))
-    for out, squares in zip(part.record.outputs, found.values.T, strict=True):
+    for out, squares in zip(term.record.outputs, found.values.T, strict=True):
         count = out.values.size
         score += count * np.log1p(squares / (count * out.sigma**2))
     return np.where(np.isfinite(score), score, np.inf)

@@ -187,14 +187,14 @@ class NetworkTerm:
         return residual if bool(np.all(is_small)) else None
 
     def update_weighting(self, point: ParameterVector) -> Self:
-        """Form the covariance of output and input noise at `point`.
+        """Compute the covariance of output and input noise at `point`.
 
         Returns the term unchanged if the simulation fails there or has no finite response.
         """
         return self._update_weighting(point) or self
 
     def update_inputs(self, point: ParameterVector) -> Self:
-        """Subtract the expected input noise at `point` from the inputs, and form the weighting
+        """Subtract the expected input noise at `point` from the inputs, and compute the weighting
         there.
 
         Returns the term unchanged if the simulation fails with the new inputs.

@@ -16,9 +16,9 @@ from pydantic import Field
 
 from drivetwin.channels.units import IN_RPM
 from drivetwin.errors import CardError, InputError, ReductionError, suggest_spelling
+from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.driveline import OutputSide
 from drivetwin.simulation.dual_clutch import FrictionTable, RoadLoad, Stribeck
-from drivetwin.simulation.vehicle_parts import Converter
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.arrays import remember_for_arrays
-from drivetwin.channels.filling import Filling, FillKind
+from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.mapping import Mapped, combine_specs, make_spec, select_free
 from drivetwin.channels.read_options import ChannelSpec, ReadOptions
 from drivetwin.channels.read_options import Column as LogColumn
@@ -137,7 +137,7 @@ def _make_column(
     if filling is None:
         rate = _estimate_update_rate(channel)
     else:
-        rate = None if filling.kind is FillKind.UNKNOWN else 1.0 / filling.period
+        rate = None if filling.interpolation is Interpolation.UNKNOWN else 1.0 / filling.period
     return Column(
         name=column.name,
         group=column.group,
@@ -151,11 +151,12 @@ def _make_column(
 
 
 def _describe_filling(column: LogColumn, filling: Filling) -> str:
-    if filling.kind is FillKind.UNKNOWN:
+    if filling.interpolation is Interpolation.UNKNOWN:
         return f"{column}: filled up by interpolation; the measured samples cannot be found"
     return (
-        f"{column}: filled up by {filling.kind} interpolation from {1e3 * filling.period:.4g} ms "
-        f"to {1e3 * filling.step:.4g} ms; only the measured samples are used"
+        f"{column}: filled up by {filling.interpolation} interpolation from "
+        f"{1e3 * filling.period:.4g} ms to {1e3 * filling.step:.4g} ms; only the measured samples "
+        "are used"
     )
 
 

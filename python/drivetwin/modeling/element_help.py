@@ -69,10 +69,10 @@ def _indent(text: str) -> str:
 
 def _wrap(text: str, indent: str = "") -> str:
     """Wrap a text at spaces outside of literals, which have to stand on one line."""
-    parts = text.split("`")
-    parts[1::2] = [one.replace(" ", _HARD_SPACE) for one in parts[1::2]]
+    pieces = text.split("`")
+    pieces[1::2] = [one.replace(" ", _HARD_SPACE) for one in pieces[1::2]]
     wrapped = fill(
-        "`".join(parts),
+        "`".join(pieces),
         _WIDTH,
         initial_indent=indent,
         subsequent_indent=indent,

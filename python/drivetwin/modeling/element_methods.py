@@ -7,26 +7,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from drivetwin.modeling.component import Component
 from drivetwin.modeling.element_help import document_methods
-from drivetwin.modeling.model_parts import ModelParts, Place
-from drivetwin.modeling.part import Part
+from drivetwin.modeling.model_components import ModelComponents, Place
 from drivetwin.modeling.plates import Plates
+from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.network import InputValue
-from drivetwin.simulation.vehicle_parts import Converter
 
 
 @document_methods
-class ElementMethods(ModelParts):
+class ElementMethods(ModelComponents):
     """Methods that add elements; the class decorator adds law and parameters to their help."""
 
-    def inertia(self, name: str, inertia: float, at: Place | None = None) -> Part:
+    def inertia(self, name: str, inertia: float, at: Place | None = None) -> Component:
         """Inertia on one node."""
         return self._add("inertia", name, node=at, inertia=inertia)
 
     def gear(
         self, name: str, a: Place | None = None, b: Place | None = None, *, ratio: float,
         loss: Mapping[str, Any] | None = None, losses: Mapping[str, Any] | None = None
-    ) -> Part:
+    ) -> Component:
         """Gear pair, with losses where stated."""
         return self._add("gear", name, a=a, b=b, ratio=ratio, loss=loss, losses=losses)
 
@@ -34,7 +34,7 @@ class ElementMethods(ModelParts):
         self, name: str, sun: Place | None = None, ring: Place | None = None,
         carrier: Place | None = None, *, z: float, planet_inertia: float | None = None,
         losses: Mapping[str, Any] | None = None
-    ) -> Part:
+    ) -> Component:
         """Planetary gear set."""
         return self._add(
             "planetary", name, sun=sun, ring=ring, carrier=carrier, z=z,
@@ -44,7 +44,7 @@ class ElementMethods(ModelParts):
     def clutch(
         self, name: str, a: Place | None = None, b: Place | None = None, *, pressure: InputValue,
         plates: Plates | None = None
-    ) -> Part:
+    ) -> Component:
         """Friction clutch, or a brake where `b` is the ground."""
         return self._add(
             "clutch", name, a=a, b=b, pressure=pressure, **(plates or Plates()).describe()
@@ -53,35 +53,35 @@ class ElementMethods(ModelParts):
     def one_way_clutch(
         self, name: str, a: Place | None = None, b: Place | None = None, *,
         clutch: Mapping[str, Any] | None = None
-    ) -> Part:
+    ) -> Component:
         """One-way clutch (freewheel), with a friction clutch in parallel where stated."""
         return self._add("one_way_clutch", name, a=a, b=b, clutch=clutch)
 
     def bearing(
         self, name: str, a: Place | None = None, b: Place | None = None, *, speed: Sequence[float],
         torque: Sequence[float], peak: float = 1.0
-    ) -> Part:
+    ) -> Component:
         """Dry and viscous friction of a bearing."""
         return self._add("bearing", name, a=a, b=b, speed=speed, torque=torque, peak=peak)
 
     def viscous_coupling(
         self, name: str, a: Place | None = None, b: Place | None = None, *, slip: Sequence[float],
         torque: Sequence[float]
-    ) -> Part:
+    ) -> Component:
         """Viscous coupling: torque over the slip, without stiction."""
         return self._add("viscous_coupling", name, a=a, b=b, slip=slip, torque=torque)
 
     def spring_damper(
         self, name: str, a: Place | None = None, b: Place | None = None, *, stiffness: float,
         damping: float = 0.0
-    ) -> Part:
+    ) -> Component:
         """Compliant shaft."""
         return self._add("spring_damper", name, a=a, b=b, stiffness=stiffness, damping=damping)
 
     def spring_table(
         self, name: str, a: Place | None = None, b: Place | None = None, *, twist: Sequence[float],
         torque: Sequence[float], damping: float = 0.0
-    ) -> Part:
+    ) -> Component:
         """Compliant shaft whose stiffness depends on its twist."""
         return self._add(
             "spring_table", name, a=a, b=b, twist=twist, torque=torque, damping=damping
@@ -90,21 +90,21 @@ class ElementMethods(ModelParts):
     def backlash(
         self, name: str, a: Place | None = None, b: Place | None = None, *, stiffness: float,
         damping: float = 0.0, gap: float
-    ) -> Part:
+    ) -> Component:
         """Coupling with play."""
         return self._add("backlash", name, a=a, b=b, stiffness=stiffness, damping=damping, gap=gap)
 
     def torque_converter(
         self, name: str, pump: Place | None = None, turbine: Place | None = None, *,
         map: Converter | Mapping[str, Any]
-    ) -> Part:
+    ) -> Component:
         """Hydrodynamic torque converter by its steady-state map."""
         return self._add("torque_converter", name, pump=pump, turbine=turbine, map=map)
 
     def tyre(
         self, name: str, a: Place | None = None, b: Place | None = None, *, slip_stiffness: float,
         least_speed: float = 0.5
-    ) -> Part:
+    ) -> Component:
         """Tyre whose force grows linearly with its longitudinal slip, without relaxation."""
         return self._add(
             "tyre", name, a=a, b=b, slip_stiffness=slip_stiffness, least_speed=least_speed
@@ -113,13 +113,13 @@ class ElementMethods(ModelParts):
     def road_load(
         self, name: str, at: Place, *, constant: float = 0.0, rolling: float = 0.0,
         aero: float = 0.0
-    ) -> Part:
+    ) -> Component:
         """External resistance of the vehicle: grade, rolling, aerodynamic."""
         return self._add("road_load", name, node=at, constant=constant, rolling=rolling, aero=aero)
 
     def torque(
         self, name: str, at: Place, value: InputValue, *, reaction: Place | None = None
-    ) -> Part:
+    ) -> Component:
         """Prescribed torque, such as a measured engine torque or that of a motor between two
         shafts."""
         return self._add("torque", name, node=at, reaction=reaction, input=value)
@@ -127,10 +127,10 @@ class ElementMethods(ModelParts):
     def engine_map(
         self, name: str, at: Place, *, throttle: InputValue, map: Mapping[str, Any],
         lag: float | None = None
-    ) -> Part:
+    ) -> Component:
         """Engine by its steady-state map over throttle and speed."""
         return self._add("engine_map", name, node=at, throttle=throttle, map=map, lag=lag)
 
-    def prescribed_speed(self, name: str, at: Place, value: InputValue) -> Part:
+    def prescribed_speed(self, name: str, at: Place, value: InputValue) -> Component:
         """Node that is driven at a given speed, whatever torque that takes."""
         return self._add("prescribed_speed", name, node=at, input=value)

@@ -25,9 +25,9 @@ from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Recording
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
+from drivetwin.modeling.component import Component, Node
 from drivetwin.modeling.element_methods import ElementMethods
-from drivetwin.modeling.model_parts import Place
-from drivetwin.modeling.part import Node, Part
+from drivetwin.modeling.model_components import Place
 from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
@@ -39,17 +39,19 @@ _STEP, _ROW, _TOP, _BOX = 150.0, 46.0, 46.0, (116.0, 32.0)
 """Distances of nodes and of rows, height of the head, and size of a box [px]."""
 
 
-def draw_schematic(title: str, parts: Sequence[Part], ground: Node) -> str:
+def draw_schematic(title: str, components: Sequence[Component], ground: Node) -> str:
     """Return the SVG text: nodes in their order from left to right, one shaft each.
 
     Elements between nodes span them; those at one node hang on it. Elements share a row where
     they do not overlap. The ground is the last shaft, hatched.
     """
-    nodes = _order_nodes(parts, ground)
+    nodes = _order_nodes(components, ground)
     place = {node: _STEP * (0.6 + index) for index, node in enumerate(nodes)}
     spans = [
         (min(at), max(at))
-        for at in ([place[port.node] for port in part.ports.values()] for part in parts)
+        for at in (
+            [place[port.node] for port in component.ports.values()] for component in components
+        )
     ]
     rows = _assign_rows(spans)
     height = _TOP + _ROW * (max(rows, default=0) + 1.4)
@@ -61,13 +63,15 @@ def draw_schematic(title: str, parts: Sequence[Part], ground: Node) -> str:
     ]
     for node in nodes:
         lines += _draw_node(node, place[node], height, is_ground=node is ground)
-    for part, row in zip(parts, rows, strict=True):
-        lines += _draw_part(part, place, _TOP + _ROW * (row + 0.7))
+    for component, row in zip(components, rows, strict=True):
+        lines += _draw_component(component, place, _TOP + _ROW * (row + 0.7))
     return "\n".join([*lines, "</svg>"]) + "\n"
 
 
-def _order_nodes(parts: Sequence[Part], ground: Node) -> list[Node]:
-    nodes = dict.fromkeys(port.node for part in parts for port in part.ports.values())
+def _order_nodes(components: Sequence[Component], ground: Node) -> list[Node]:
+    nodes = dict.fromkeys(
+        port.node for component in components for port in component.ports.values()
+    )
     turning = [node for node in nodes if node is not ground]
     return [*turning, ground] if ground in nodes else turning
 
@@ -99,17 +103,17 @@ def _draw_node(node: Node, x: float, height: float, *, is_ground: bool) -> list[
     ]
 
 
-def _draw_part(part: Part, place: dict[Node, float], y: float) -> list[str]:
-    at = [place[port.node] for port in part.ports.values()]
+def _draw_component(component: Component, place: dict[Node, float], y: float) -> list[str]:
+    at = [place[port.node] for port in component.ports.values()]
     width, height = _BOX
     x = 0.5 * (min(at) + max(at))
-    kind = part.kind.replace("_", " ")
+    kind = component.kind.replace("_", " ")
     return [
         f'<line x1="{min(at):g}" y1="{y:g}" x2="{max(at):g}" y2="{y:g}" stroke="#333"/>',
         *(f'<circle cx="{end:g}" cy="{y:g}" r="3" fill="#333"/>' for end in dict.fromkeys(at)),
         f'<rect x="{x - width / 2:g}" y="{y - height / 2:g}" width="{width:g}" '
         f'height="{height:g}" rx="4" fill="#eef3fb" stroke="#335"/>',
-        f'<text x="{x:g}" y="{y - 3:g}" text-anchor="middle">{escape(part.name)}</text>',
+        f'<text x="{x:g}" y="{y - 3:g}" text-anchor="middle">{escape(component.name)}</text>',
         f'<text x="{x:g}" y="{y + 11:g}" text-anchor="middle" fill="#667">{kind}</text>',
     ]
 
@@ -129,8 +133,8 @@ class Model(ElementMethods):
         self,
         speeds: Mapping[Place, float] | None = None,
         *,
-        twists: Mapping[Part | str, float] | None = None,
-        locked: Sequence[Part | str] = (),
+        twists: Mapping[Component | str, float] | None = None,
+        locked: Sequence[Component | str] = (),
     ) -> None:
         """Set the start: speeds of nodes [rad/s], twists of shafts [rad], elements without slip.
 
@@ -171,7 +175,7 @@ class Model(ElementMethods):
         start = self._resolve_start()
         outputs = self.list_outputs() if record is None else list(record)
         inputs = self._make_inputs((float(grid[0]), float(grid[-1])))
-        elements = [part.element for part in self.parts]
+        elements = [component.element for component in self.components]
         run = simulate(elements, inputs, start, grid, outputs, audit=audit, accuracy=accuracy)
         return ModelRun(run)
 
@@ -205,7 +209,7 @@ class Model(ElementMethods):
         grid = self._make_grid(time)
         speeds = [node.speed for node in self.nodes if node is not self.ground]
         return differentiate(
-            [part.element for part in self.parts],
+            [component.element for component in self.components],
             self._make_inputs((float(grid[0]), float(grid[-1]))),
             self._resolve_start(),
             grid,
@@ -259,7 +263,7 @@ class Model(ElementMethods):
 
         Raises InputError with all faults of the model.
         """
-        elements = [part.element for part in self.parts]
+        elements = [component.element for component in self.components]
         return NetworkModel(
             self.name, elements, self.inputs, self._resolve_start(), outputs, unknowns
         )
@@ -268,11 +272,14 @@ class Model(ElementMethods):
         """List everything that a run records."""
         nodes = [node for node in self.nodes if node is not self.ground]
         of_nodes = [output for node in nodes for output in (node.speed, node.acceleration)]
-        return [*of_nodes, *(one for part in self.parts for one in part.list_outputs(self.ground))]
+        return [
+            *of_nodes,
+            *(one for component in self.components for one in component.list_outputs(self.ground)),
+        ]
 
     def draw(self) -> str:
         """Return a schematic as SVG text: nodes as vertical lines, elements as boxes."""
-        return draw_schematic(self.name, self.parts, self.ground)
+        return draw_schematic(self.name, self.components, self.ground)
 
     def to_modelica(self, time: float | None = None) -> str:
         """Return a Modelica package; with the end `time` [s], inputs and start are in it too."""
@@ -281,7 +288,7 @@ class Model(ElementMethods):
         if time is not None:
             span = (0.0, require_number("end time", time))
             run = Run(self._make_inputs(span), self._resolve_start(), span)
-        return format_package(self.name, [part.element for part in self.parts], run)
+        return format_package(self.name, [component.element for component in self.components], run)
 
     def _make_grid(self, time: float | FloatArray) -> FloatArray:
         if np.ndim(time) > 0:
@@ -295,23 +302,26 @@ class Model(ElementMethods):
     def _resolve_start(self) -> Start:
         refuse_faults(self._find_faults())
         speeds = {self._get_node(at).name: speed for at, speed in self._speeds.items()}
-        twists = {_get_name(part): twist for part, twist in self._twists.items()}
-        return Start(speeds, twists, tuple(_get_name(part) for part in self._locked))
+        twists = {_get_name(component): twist for component, twist in self._twists.items()}
+        return Start(speeds, twists, tuple(_get_name(component) for component in self._locked))
 
     def _find_faults(self) -> list[str]:
         """All faults of elements and start, with suggestions for misspelt names."""
-        faults = [*self.faults, *find_element_faults([part.element for part in self.parts])]
+        faults = [
+            *self.faults,
+            *find_element_faults([component.element for component in self.components]),
+        ]
         nodes = [node.name for node in self.nodes]
         for at in self._speeds:
             if isinstance(at, str) and at not in nodes:
                 faults.append(f"start: no node {at!r}{suggest_spelling(at, nodes)}")
-        names = [part.name for part in self.parts]
-        for part in (*self._twists, *self._locked):
-            if _get_name(part) not in names:
-                hint = suggest_spelling(_get_name(part), names)
-                faults.append(f"start: no element {_get_name(part)!r}{hint}")
+        names = [component.name for component in self.components]
+        for component in (*self._twists, *self._locked):
+            if _get_name(component) not in names:
+                hint = suggest_spelling(_get_name(component), names)
+                faults.append(f"start: no element {_get_name(component)!r}{hint}")
         return faults
 
 
-def _get_name(part: Part | str) -> str:
-    return part if isinstance(part, str) else part.name
+def _get_name(component: Component | str) -> str:
+    return component if isinstance(component, str) else component.name

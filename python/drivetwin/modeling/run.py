@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from drivetwin.errors import InputError, suggest_spelling
-from drivetwin.modeling.part import Part
+from drivetwin.modeling.component import Component
 from drivetwin.report.data_frames import import_pandas
 from drivetwin.simulation.dual_clutch import EnergyAudit, Event, FloatArray
 from drivetwin.simulation.network import NetworkRun, Output
@@ -20,9 +20,9 @@ class Events(Sequence[Event]):
 
     all: tuple[Event, ...]
 
-    def of(self, part: Part | str) -> tuple[Event, ...]:
+    def of(self, component: Component | str) -> tuple[Event, ...]:
         """Return the events of one element."""
-        name = part if isinstance(part, str) else part.name
+        name = component if isinstance(component, str) else component.name
         return tuple(event for event in self.all if event.element == name)
 
     def __getitem__(self, index: Any) -> Any:

@@ -126,7 +126,7 @@ def is_driving(model: DualClutch, seen: Recorded, delay: float) -> BoolArray:
 
 
 def build_course(model: DualClutch, seen: Recorded, delay: float, driving: BoolArray) -> Course:
-    """Build the inputs and locks over the grid; `delay` [s] is the age of the engine torque.
+    """Build the inputs and locks over the grid; `delay` [s] is the delay of the engine torque.
 
     `driving` (N-1,) is the result of `is_driving`.
     """

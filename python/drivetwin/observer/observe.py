@@ -27,9 +27,9 @@ from drivetwin.observer.smooth import smooth
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.added_elements import AddedElements, describe_added_elements
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
-from drivetwin.simulation.vehicle_parts import VehicleParts, describe_parts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
 from drivetwin.vehicle.spec import PriorValue
@@ -85,7 +85,7 @@ def simulate_observed(
             continue
         one = _simulate_member(
             model,
-            twin.build_parts(model),
+            twin.build_added_elements(model),
             _sample_signal(torque, known.to_named(values)["te_delay"], rng),
             {name: _sample_signal(signal, 0.0, rng) for name, signal in noise.items()},
             _sample_start(model, run, (shift, unrest), rng),
@@ -114,7 +114,7 @@ def _compute_band(column: FloatArray, others: list[FloatArray]) -> Band:
 
 
 def _sample_signal(signal: MeasuredSignal, delay: float, rng: np.random.Generator) -> Signal:
-    """The signal with other noise of its level, moved back by its age [s]; ends are held."""
+    """The signal with other noise of its level, moved back by its delay [s]; ends are held."""
     values = signal.values + signal.sigma * rng.standard_normal(signal.values.size)
     time = np.concatenate([[signal.time[0] - 1.0], signal.time, [signal.time[-1] + 1.0]])
     return Signal(time, np.concatenate([values[:1], values, values[-1:]]), -delay)
@@ -139,7 +139,7 @@ def _sample_start(
 
 def _simulate_member(
     model: DualClutch,
-    parts: VehicleParts,
+    added: AddedElements,
     torque: Signal,
     pressures: Mapping[str, Signal],
     start: State,
@@ -147,7 +147,7 @@ def _simulate_member(
 ) -> Trajectory | None:
     """A run of the ensemble; None where drawn values make none."""
     try:
-        found = DrivelineTask(model, parts, torque, pressures, start, time).simulate()
+        found = DrivelineTask(model, added, torque, pressures, start, time).simulate()
     except InputError:
         return None
     return found if found.status == "completed" else None
@@ -167,8 +167,8 @@ def estimate_torques(
     If the converter is open and the twin has its map, the turbine torque replaces the engine
     torque. The gears before and after the shift are used as far as the inputs were recorded, and
     for FAR at most; the notes contain any cut.
-    The smoother's model is the dual clutch; where the twin has other parts, their effect on its own
-    run widens the bands.
+    The smoother's model is the dual clutch; where the twin has other elements, their effect on its
+    own run widens the bands.
     Raises MissingParameterError where the twin is incomplete, MissingChannelError and InputError
     where the log is incomplete, DamagedChannelError where an input has a gap in the shift,
     SimulationError where the twin's own run fails.
@@ -178,24 +178,24 @@ def estimate_torques(
     whole = trim_to_window(trim_to_recorded(log, shift, fills, twin.i_in), (FAR, FAR))
     if by is Observer.SIMULATION:
         found = simulate_observed(twin, log, whole)
-    elif twin.part_values:
-        found = _add_part_error(smooth(twin.drop_part(), log, whole), twin, log, whole)
+    elif twin.added_element_values:
+        found = _add_element_error(smooth(twin.drop_added_elements(), log, whole), twin, log, whole)
     else:
         found = smooth(twin, log, whole)
     cuts = render(whole.findings[len(shift.findings) :])
     return replace(found, notes=(*cuts, *found.notes))
 
 
-def _add_part_error(found: Observation, twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
-    """Widen the bands by the effect of the parts beside the dual clutch on the twin's own run."""
+def _add_element_error(found: Observation, twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
+    """Widen the bands by the effect of the added elements on the run of the twin itself."""
     channels = {role: one for role, one in log.channels.items() if role != "output_torque"}
     quiet = replace(log, channels=channels)
-    runs = [simulate_shift(one, quiet, shift) for one in (twin, twin.drop_part())]
+    runs = [simulate_shift(one, quiet, shift) for one in (twin, twin.drop_added_elements())]
     for one in runs:
         if one.status != "completed":
             raise SimulationError(
                 f"the simulation of shift {shift.start_gear}-{shift.end_gear} ended: {one.status}",
-                "identify the log again without the part",
+                "identify the log again without the added element",
             )
     whole, reduced = (collect_torques(one.trajectory) for one in runs)
 
@@ -204,7 +204,7 @@ def _add_part_error(found: Observation, twin: Twin, log: ShiftLog, shift: Shift)
         return Band(band.value, np.hypot(band.std, error))
 
     clutches = {name: widen(name, band) for name, band in found.clutch_torque.items()}
-    note = f"bands contain the error by {describe_parts(twin.part_values)}"
+    note = f"bands contain the error by {describe_added_elements(twin.added_element_values)}"
     return replace(
         found,
         output_torque=widen("output_torque", found.output_torque),

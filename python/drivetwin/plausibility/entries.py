@@ -152,6 +152,6 @@ def _check_sensors(card: VehicleCard) -> Iterator[Finding]:
         for name, found in (
             ("gain_tolerance", sensor.gain),
             (f"offset_tolerance_{unit}", sensor.offset / size),
-            ("age_tolerance_ms", 1e3 * sensor.age),
+            ("delay_tolerance_ms", 1e3 * sensor.delay),
         ):
             yield from _expect(card, ("sensors", role, name), found)

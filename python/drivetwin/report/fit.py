@@ -53,8 +53,8 @@ def render_fit(
     remarks: Sequence[Finding] = (),
 ) -> str:
     """HTML text of the page; equal fits give equal text."""
-    parts = zip(logs, found.problem.parts, found.simulate(), strict=True)
-    figures = [_build_figure(log, part, run) for log, part, run in parts]
+    terms = zip(logs, found.problem.terms, found.simulate(), strict=True)
+    figures = [_build_figure(log, term, run) for log, term, run in terms]
     sections = [
         Section("result", "Result", "", [_build_verdict(found), *_build_parameters(found)]),
         build_findings_section((*remarks, *found.findings)),
@@ -103,19 +103,19 @@ def _build_parameters(found: ModelFit) -> list[Block]:
     return build_parameter_blocks(found.estimates, f"{count} unknowns of the model.")
 
 
-def _build_figure(log: str, part: NetworkTerm, run: NetworkRun) -> FigureBlock:
+def _build_figure(log: str, term: NetworkTerm, run: NetworkRun) -> FigureBlock:
     """Draw the outputs of a recording, measured and simulated, and the inputs below."""
     panels = []
-    for out in part.record.outputs:
-        output = part.plant.outputs[out.name]
+    for out in term.record.outputs:
+        output = term.plant.outputs[out.name]
         curves = [
-            Curve("measured", part.record.time[out.place], out.values, MEASURED),
+            Curve("measured", term.record.time[out.place], out.values, MEASURED),
             Curve("simulated", run.time, run.columns[output], SIMULATED),
         ]
         panels.append(Panel(out.name, _get_display(get_output_quantity(output)), curves))
-    for name, signal in part.record.inputs.items():
+    for name, signal in term.record.inputs.items():
         curve = Curve("input", signal.time, signal.values, MUTED)
-        quantity = find_input_quantity(name, part.plant.elements)
+        quantity = find_input_quantity(name, term.plant.elements)
         panels.append(Panel(name, _get_display(quantity), [curve], weight=0.6))
     view = (float(run.time[0]), float(run.time[-1]))
     figure = plot_over_time_axis(panels, view, _HEIGHT * len(panels))

@@ -178,7 +178,7 @@ def locate_break_away(
     if slip.stairs or _is_sparse(speeds, settings):
         return _to_boundary(seen)
     run = speeds.count_samples(_QUIET, 3)
-    still = _find_true_runs(slip.departure[: last + 1] < _LIMIT, run)
+    still = _find_true_runs(slip.deviation[: last + 1] < _LIMIT, run)
     anchor = max(int(still.max()) + run - 1, first) if len(still) else last
     window = _select_first_window(
         slip, anchor, Moving.AFTER, speeds.count_samples(settings.hinge_window, _LEAST)
@@ -208,7 +208,7 @@ def locate_lock_up(
             locate_slip_end(slip.time[span], slip.error[span] - slip.level, slip.noise)
         )
     run = speeds.count_samples(_QUIET, 3)
-    still = _find_true_runs(slip.departure[first : last + 1] < _LIMIT, run)
+    still = _find_true_runs(slip.deviation[first : last + 1] < _LIMIT, run)
     anchor = first + int(still.min()) if len(still) else first
     window = _select_first_window(
         slip, anchor, Moving.BEFORE, speeds.count_samples(settings.hinge_window, _LEAST)
@@ -237,7 +237,7 @@ class _Slip:
     """Synchronisation error (n,) on `time` [s], and how far it is from that of the gear held.
 
     `level` is the error at rest. `noise` [rad/s] is that of one sample at rest, at least `floor`.
-    `departure` (n,) is the distance, smoothed over SMOOTH, in standard deviations of the smoothed
+    `deviation` (n,) is the distance, smoothed over SMOOTH, in standard deviations of the smoothed
     error; divided by `root` in those of a sample. `stairs`: the noise is that of rounding, alike
     over many samples, so that no curve can be fitted.
     """
@@ -247,7 +247,7 @@ class _Slip:
     level: float
     floor: float
     noise: float
-    departure: FloatArray
+    deviation: FloatArray
     root: float
     stairs: bool
 
@@ -274,7 +274,7 @@ def _estimate_white_noise(error: FloatArray) -> float:
 
 def _select_first_window(slip: _Slip, anchor: int, moving: Moving, shortest: int) -> int:
     """Samples from `anchor` on to where the slip has clearly left rest, within bounds."""
-    ahead = slip.departure[anchor:] if moving is Moving.AFTER else slip.departure[anchor::-1]
+    ahead = slip.deviation[anchor:] if moving is Moving.AFTER else slip.deviation[anchor::-1]
     clear = np.flatnonzero(ahead > _CLEAR * slip.root)
     reached = int(clear[0]) if len(clear) else _WIDEN * shortest
     return int(np.clip(reached, shortest, _WIDEN * shortest))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Change-point estimation: hinge fits of departure from, or return to, rest, with sigma."""
+"""Change-point estimation: hinge fits of the end or begin of rest, with sigma."""
 
 from __future__ import annotations
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from drivetwin._native import batch_sensitivities as native_batch_sensitivities
 from drivetwin._native import simulate_batch as native_simulate_batch
 from drivetwin.errors import InputError
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.driveline import build_start
 from drivetwin.simulation.dual_clutch import (
     MOTION,
@@ -34,7 +35,6 @@ from drivetwin.simulation.dual_clutch import (
 from drivetwin.simulation.dual_clutch_sensitivity import Seed, list_seeds, place_sets
 from drivetwin.simulation.network import NativeOutput
 from drivetwin.simulation.serialize import as_array, as_json, as_names
-from drivetwin.simulation.vehicle_parts import NO_PARTS
 
 
 class Keep(StrEnum):
@@ -271,7 +271,10 @@ def parse_output(name: str) -> NativeOutput:
 
 
 def _to_core_scenarios(model: DualClutch, scenarios: Sequence[Scenario]) -> list[CoreScenario]:
-    starts = (build_start(model, NO_PARTS, one.start, one.engine_torque, 0.0) for one in scenarios)
+    starts = (
+        build_start(model, NO_ADDED_ELEMENTS, one.start, one.engine_torque, 0.0)
+        for one in scenarios
+    )
     return [
         ((to_delayed_core_samples(one.inputs), []), start.to_core())
         for one, start in zip(scenarios, starts, strict=True)

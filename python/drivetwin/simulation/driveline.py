@@ -16,6 +16,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from drivetwin.errors import InputError
+from drivetwin.simulation.added_elements import (
+    NO_ADDED_ELEMENTS,
+    AddedElements,
+    InputShaft,
+    OpenConverter,
+)
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
@@ -29,7 +35,6 @@ from drivetwin.simulation.dual_clutch import (
 from drivetwin.simulation.element_schema import list_ports
 from drivetwin.simulation.network import Element, Output, Start, build_element
 from drivetwin.simulation.variable import sign
-from drivetwin.simulation.vehicle_parts import NO_PARTS, InputShaft, OpenConverter, VehicleParts
 
 CRANK, ENGINE, INPUT, OUTPUT, AXLE, WHEEL, VEHICLE = (
     *("crankshaft", "engine", "input gear", "output", "axle", "wheel", "vehicle"),
@@ -59,14 +64,14 @@ class OutputSide:
 
 @dataclass(frozen=True, eq=False)
 class Driveline:
-    """Dual clutch with the parts beside it."""
+    """Dual clutch with the elements beside it."""
 
     model: DualClutch
-    parts: VehicleParts = NO_PARTS
+    added: AddedElements = NO_ADDED_ELEMENTS
 
-    def share_axes(self, other: VehicleParts) -> Driveline:
-        """Return the driveline with tables of its parts over the axes of those of `other`."""
-        return Driveline(self.model, self.parts.share_axes(other))
+    def share_axes(self, other: AddedElements) -> Driveline:
+        """Return the driveline with its tables over the axes of those of `other`."""
+        return Driveline(self.model, self.added.share_axes(other))
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,7 @@ class VehicleBody:
 
 def find_body(driveline: Driveline) -> VehicleBody:
     """Find the inertia that moves with the vehicle: behind the tyre where there is one."""
-    model, tyre = driveline.model, driveline.parts.tyre
+    model, tyre = driveline.model, driveline.added.tyre
     if tyre is None:
         return VehicleBody(model.J_v, "J_v.inertia", ("shaft_torque", SHAFT), model.i_f)
     inertia = model.J_v - tyre.rim_inertia
@@ -109,32 +114,32 @@ def build_clutch(
     return build_element("clutch", name, a=a, b=b, **fields, drum_inertia=drum_inertia)
 
 
-def build_driveline(model: DualClutch, parts: VehicleParts = NO_PARTS) -> list[Element]:
-    """Build the elements of a dual clutch with parts.
+def build_driveline(model: DualClutch, added: AddedElements = NO_ADDED_ELEMENTS) -> list[Element]:
+    """Build the elements of a dual clutch with added elements.
 
     Inputs are `ENGINE_TORQUE` [N m], the pressures [Pa] by shift element, and `WALK` [N m] where
     the load has one.
     """
     loss = {"law": model.loss_law, "eta": model.eta}
     return [
-        *build_engine_side(model.J1, parts),
+        *build_engine_side(model.J1, added),
         build_element("gear", "i_in", a=ENGINE, b=INPUT, ratio=model.i_in, loss=loss),
         build_element("inertia", "J2e", node=INPUT, inertia=model.J2e * model.i_in * model.i_in),
         build_element("inertia", "J_out", node=OUTPUT, inertia=model.J_out),
-        *build_shaft(OutputSide.from_model(model), OUTPUT, parts),
-        *(one for each in model.elements for one in _build_path(each, model, parts)),
-        *build_vehicle(OutputSide.from_model(model), parts),
+        *build_shaft(OutputSide.from_model(model), OUTPUT, added),
+        *(one for each in model.elements for one in _build_path(each, model, added)),
+        *build_vehicle(OutputSide.from_model(model), added),
     ]
 
 
 def build_engine_side(
-    J1: float, parts: VehicleParts = NO_PARTS, node: str = ENGINE
+    J1: float, added: AddedElements = NO_ADDED_ELEMENTS, node: str = ENGINE
 ) -> list[Element]:
-    """Build the inertia J1 [kg m^2] with the engine torque, and the parts before the gearbox.
+    """Build the inertia J1 [kg m^2] with the engine torque, and the elements before the gearbox.
 
     `node` is the one on which J1 turns.
     """
-    front, gearbox, inertia = parts.front, node, J1
+    front, gearbox, inertia = added.front, node, J1
     elements = []
     if isinstance(front, InputShaft):
         node, inertia = CRANK, J1 - front.inertia
@@ -153,7 +158,7 @@ def build_engine_side(
         build_element("inertia", "J1", node=gearbox, inertia=inertia),
         build_element("torque", "engine", node=node, input=ENGINE_TORQUE),
         *elements,
-        *_build_drag("input drag", gearbox, parts.input_drag),
+        *_build_drag("input drag", gearbox, added.input_drag),
     ]
 
 
@@ -162,12 +167,12 @@ def get_side_nodes(name: str) -> tuple[str, str]:
     return f"{name} input side", f"{name} output side"
 
 
-def _build_path(element: ShiftElement, model: DualClutch, parts: VehicleParts) -> list[Element]:
+def _build_path(element: ShiftElement, model: DualClutch, added: AddedElements) -> list[Element]:
     """Build a shift element between its two ratios (eq. 15)."""
     name, (driving, driven) = element.name, get_side_nodes(element.name)
     fields: dict[str, Any] = {}
-    if name in parts.efficiency:
-        fields = {"loss": {"law": model.loss_law, "eta": parts.efficiency[name]}}
+    if name in added.efficiency:
+        fields = {"loss": {"law": model.loss_law, "eta": added.efficiency[name]}}
     return [
         build_element("gear", f"i_c {name}", a=INPUT, b=driving, ratio=element.i_c, **fields),
         build_clutch(
@@ -183,29 +188,31 @@ def _build_path(element: ShiftElement, model: DualClutch, parts: VehicleParts) -
     ]
 
 
-def build_shaft(side: OutputSide, output: str, parts: VehicleParts = NO_PARTS) -> list[Element]:
+def build_shaft(
+    side: OutputSide, output: str, added: AddedElements = NO_ADDED_ELEMENTS
+) -> list[Element]:
     """Build the output shaft behind the node `output`, the final drive and the wheel."""
     fields: dict[str, Any] = {"a": output, "b": AXLE, "damping": side.c_o}
-    table = parts.shaft_table
+    table = added.shaft_table
     if table is not None:
         curve = {"twist": list(table.twist), "torque": list(table.torque)}
         shaft = build_element("spring_table", SHAFT, **fields, **curve)
-    elif parts.gap > 0.0:
-        shaft = build_element("backlash", SHAFT, **fields, stiffness=side.k_o, gap=parts.gap)
+    elif added.gap > 0.0:
+        shaft = build_element("backlash", SHAFT, **fields, stiffness=side.k_o, gap=added.gap)
     else:
         shaft = build_element("spring_damper", SHAFT, **fields, stiffness=side.k_o)
-    inertia = side.J_v if parts.tyre is None else parts.tyre.rim_inertia
+    inertia = side.J_v if added.tyre is None else added.tyre.rim_inertia
     return [
         shaft,
         build_element("gear", "i_f", a=AXLE, b=WHEEL, ratio=side.i_f),
         build_element("inertia", "J_v", node=WHEEL, inertia=inertia),
-        *_build_drag("brake drag", WHEEL, parts.brake_drag),
+        *_build_drag("brake drag", WHEEL, added.brake_drag),
     ]
 
 
-def build_vehicle(side: OutputSide, parts: VehicleParts = NO_PARTS) -> list[Element]:
+def build_vehicle(side: OutputSide, added: AddedElements = NO_ADDED_ELEMENTS) -> list[Element]:
     """Build the load at the wheel, or the vehicle with its load behind a tyre."""
-    body, tyre = WHEEL, parts.tyre
+    body, tyre = WHEEL, added.tyre
     elements = []
     if tyre is not None:
         body, inertia = VEHICLE, side.J_v - tyre.rim_inertia
@@ -215,7 +222,7 @@ def build_vehicle(side: OutputSide, parts: VehicleParts = NO_PARTS) -> list[Elem
             build_element("inertia", "vehicle", node=VEHICLE, inertia=inertia),
         ]
     elements.append(build_element("road_load", LOAD, node=body, **vars(side.load)))
-    if parts.walk is not None:
+    if added.walk is not None:
         elements.append(build_element("torque", WALK, node=body, input=WALK))
     return elements
 
@@ -245,27 +252,27 @@ _STALL = 0.05
 
 
 def settle(
-    model: DualClutch, parts: VehicleParts, start: State, engine_torque: Signal, time: float
+    model: DualClutch, added: AddedElements, start: State, engine_torque: Signal, time: float
 ) -> State:
     """Return a start with the twist of the output shaft that quasi-steady acceleration has.
 
     `engine_torque` is the acting one, `time` [s] the instant of the start. The twist is without
     the play of the shaft.
     """
-    torque, _ = _solve_acceleration(model, parts, start, _interpolate(engine_torque, time))
-    return replace(start, twist=compute_twist(model, parts, torque))
+    torque, _ = _solve_acceleration(model, added, start, _interpolate(engine_torque, time))
+    return replace(start, twist=compute_twist(model, added, torque))
 
 
-def compute_twist(model: DualClutch, parts: VehicleParts, torque: float) -> float:
+def compute_twist(model: DualClutch, added: AddedElements, torque: float) -> float:
     """Compute the twist [rad] at which the output shaft has `torque` [N m], without its play."""
-    table = parts.shaft_table
+    table = added.shaft_table
     if table is None:
         return torque / model.k_o
     return float(np.interp(torque, table.torque, table.twist))
 
 
 def build_start(
-    model: DualClutch, parts: VehicleParts, start: State, engine_torque: Signal, time: float
+    model: DualClutch, added: AddedElements, start: State, engine_torque: Signal, time: float
 ) -> Start:
     """Build the start of the network: speeds and twist of `start`, the rest quasi-steady.
 
@@ -273,22 +280,22 @@ def build_start(
     the acting one, `time` [s] the instant of the start.
     """
     speeds = {ENGINE: start.engine_speed, OUTPUT: start.output_speed, WHEEL: start.wheel_speed}
-    twists = {SHAFT: start.twist + 0.5 * parts.gap * sign(start.twist)}
-    front, tyre = parts.front, parts.tyre
+    twists = {SHAFT: start.twist + 0.5 * added.gap * sign(start.twist)}
+    front, tyre = added.front, added.tyre
     if front is None and tyre is None:
         return Start(speeds, twists, start.locked)
     drive = _interpolate(engine_torque, time)
     if isinstance(front, OpenConverter):
         speeds[CRANK] = solve_steady_speed(front, drive, start.engine_speed)
         return Start(speeds, twists, start.locked)
-    torque, rate = _solve_acceleration(model, parts, start, drive)
+    torque, rate = _solve_acceleration(model, added, start, drive)
     if isinstance(front, InputShaft):
         speeds[CRANK] = start.engine_speed
         ratio = model.get_overall_ratio(start.locked[0]) * model.i_f
         twists[INPUT_SHAFT] = (drive - front.inertia * (ratio * rate)) / front.stiffness
     if tyre is not None:
         wheel = start.wheel_speed
-        braking = parts.brake_drag * sign(wheel)
+        braking = added.brake_drag * sign(wheel)
         passed = model.i_f * torque - braking - tyre.rim_inertia * rate
         speeds[VEHICLE] = wheel / (1.0 + passed / tyre.slip_stiffness * sign(wheel))
     return Start(speeds, twists, start.locked)
@@ -311,17 +318,17 @@ def _interpolate(engine_torque: Signal, time: float) -> float:
 
 
 def _solve_acceleration(
-    model: DualClutch, parts: VehicleParts, start: State, engine_torque: float
+    model: DualClutch, added: AddedElements, start: State, engine_torque: float
 ) -> tuple[float, float]:
     """Return the torque of the output shaft [N m] and the acceleration of the wheel [rad/s²].
 
-    All parts accelerate alike in the gear that `start` holds. The drums of open elements are left
+    All bodies accelerate alike in the gear that `start` holds. The drums of open elements are left
     out, as in `DualClutch.compute_steady_torque`.
     """
     wheel, (gear, *_) = start.wheel_speed, start.locked
-    walk = 0.0 if parts.walk is None else float(parts.walk.values[0])
-    constant = model.load.constant + walk + parts.brake_drag * sign(wheel)
+    walk = 0.0 if added.walk is None else float(added.walk.values[0])
+    constant = model.load.constant + walk + added.brake_drag * sign(wheel)
     loaded = replace(model, load=replace(model.load, constant=constant))
     ratio = model.get_overall_ratio(gear)
-    torque = loaded.compute_steady_torque(engine_torque - parts.input_drag, ratio, wheel)
+    torque = loaded.compute_steady_torque(engine_torque - added.input_drag, ratio, wheel)
     return torque, (model.i_f * torque - loaded.load.evaluate(wheel)) / model.J_v

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs of a driveline with parts, and their exact derivatives by any unknowns."""
+"""Runs of a driveline with added elements, and their exact derivatives by any unknowns."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline import (
     CRANK,
     ENGINE,
@@ -30,7 +31,6 @@ from drivetwin.simulation.dual_clutch import (
 from drivetwin.simulation.network import NetworkRun, Output, Start
 from drivetwin.simulation.network import simulate as simulate_network
 from drivetwin.simulation.network_sensitivity import NetworkTask
-from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
 COMPARED: Mapping[str, Output] = {
     "output_torque": ("shaft_torque", SHAFT),
@@ -43,13 +43,13 @@ COMPARED: Mapping[str, Output] = {
 
 @dataclass(frozen=True, eq=False)
 class DrivelineTask:
-    """A dual clutch with `parts`, its acting inputs, start, and the `time` (n,) [s] of the run.
+    """A dual clutch with `added` elements, acting inputs, start, and `time` (n,) [s] of the run.
 
     `pressures` [Pa] are by shift element. The twist of `start` is the one that makes torque.
     """
 
     model: DualClutch
-    parts: VehicleParts
+    added: AddedElements
     engine_torque: Signal
     pressures: Mapping[str, Signal]
     start: State
@@ -59,8 +59,8 @@ class DrivelineTask:
     def inputs(self) -> dict[str, Signal]:
         """Inputs of the network by name."""
         found = {**self.pressures, ENGINE_TORQUE: self.engine_torque}
-        if self.parts.walk is not None:
-            found[WALK] = Signal(self.parts.walk.time, -self.parts.walk.values)
+        if self.added.walk is not None:
+            found[WALK] = Signal(self.added.walk.time, -self.added.walk.values)
         return found
 
     @property
@@ -80,7 +80,7 @@ class DrivelineTask:
 
         Raises InputError where the description is inconsistent.
         """
-        elements = build_driveline(self.model, self.parts)
+        elements = build_driveline(self.model, self.added)
         return simulate_network(elements, self.inputs, self._build_start(), self.time, outputs)
 
     def differentiate(self, count: int) -> tuple[Trajectory, Mapping[Output, FloatArray]]:
@@ -97,7 +97,7 @@ class DrivelineTask:
             Where the description is inconsistent.
         """
         task = NetworkTask(
-            build_driveline(self.model, self.parts),
+            build_driveline(self.model, self.added),
             self.inputs,
             self._build_start(),
             self.time,
@@ -107,12 +107,12 @@ class DrivelineTask:
         return build_trajectory(found.run, self.names), found.derivatives
 
     def _list_outputs(self) -> list[Output]:
-        crank: list[Output] = [] if self.parts.front is None else [("speed", CRANK)]
+        crank: list[Output] = [] if self.added.front is None else [("speed", CRANK)]
         return [*list_motion_outputs(self.names), *crank]
 
     def _build_start(self) -> Start:
         time = float(self.time[0])
-        return build_start(self.model, self.parts, self.start, self.engine_torque, time)
+        return build_start(self.model, self.added, self.start, self.engine_torque, time)
 
 
 @check_arguments
@@ -133,7 +133,7 @@ def simulate(
     Raises InputError where the description is inconsistent; a run that fails returns its status.
     """
     inputs = collect_inputs(engine_torque, pressures)
-    begin = build_start(model, NO_PARTS, start, engine_torque, 0.0)
+    begin = build_start(model, NO_ADDED_ELEMENTS, start, engine_torque, 0.0)
     names = [one.name for one in model.elements]
     given = (build_driveline(model), inputs, begin, time, list_motion_outputs(names))
     run = simulate_network(*given, audit=audit, accuracy=accuracy)

@@ -12,6 +12,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import InputError, suggest_spelling
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.driveline_run import build_trajectory, list_motion_outputs
 from drivetwin.simulation.dual_clutch import (
@@ -24,7 +25,6 @@ from drivetwin.simulation.dual_clutch import (
 )
 from drivetwin.simulation.network_sensitivity import Description, NetworkTask
 from drivetwin.simulation.serialize import as_array, as_names
-from drivetwin.simulation.vehicle_parts import NO_PARTS
 
 if TYPE_CHECKING:
     from drivetwin.simulation.dual_clutch import DualClutch
@@ -150,7 +150,7 @@ def simulate_sensitivities(
     """
     inputs, parameters = collect_inputs(engine_torque, pressures), as_names(parameters)
     require_delays(inputs, parameters)
-    begin = build_start(model, NO_PARTS, start, engine_torque, 0.0)
+    begin = build_start(model, NO_ADDED_ELEMENTS, start, engine_torque, 0.0)
     seeded = Description.build(build_driveline(model), inputs, begin)
     slopes: dict[str, FloatArray] = {}
     for unknown, path, weight in list_seeds(model, parameters, {})[1]:

@@ -104,8 +104,8 @@ def iterate_variables(description: Any) -> Iterator[Variable]:
     if isinstance(description, Variable):
         yield description
     elif isinstance(description, dict | list | tuple):
-        parts = description.values() if isinstance(description, dict) else description
-        for one in parts:
+        entries = description.values() if isinstance(description, dict) else description
+        for one in entries:
             yield from iterate_variables(one)
 
 

@@ -16,8 +16,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.parameters import LAW_KEYS, OVER_ETA, SPECS, make_law_id
 from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS, PROGRESSION
 from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, ShiftElement, Stribeck
-from drivetwin.simulation.vehicle_parts import PART_IDS, PROGRESSION
 from drivetwin.twin.friction_law import (
     build_partner_spread,
     compute_law_covariance,
@@ -80,13 +80,13 @@ class ModelDistribution:
     def draw_model(self, values: FloatArray, random: np.random.Generator) -> DualClutch | None:
         """Build the model at drawn `values` (p,) and draw the scale of each friction curve.
 
-        None where a value that must be positive is not, or that of a part is beyond its bounds.
+        None where a value that must be positive is not, or one of an added element out of bounds.
         """
         named = self.to_named(values)
         signed = (*LAW_KEYS, "Tv_over_if", "te_delay", "p_delay", PROGRESSION)
         if any(value <= 0.0 and not name.startswith(signed) for name, value in named.items()):
             return None
-        if not has_possible_parts(named):
+        if not has_possible_elements(named):
             return None
         model = self.build_model(values)
         elements = tuple(
@@ -99,9 +99,9 @@ class ModelDistribution:
         return replace(model, elements=elements)
 
 
-def has_possible_parts(named: Mapping[str, float]) -> bool:
-    """Return whether the parameters of parts among `named`, by id, are below their bounds."""
-    return all(abs(named.get(name, 0.0)) < SPECS[name].upper for name in PART_IDS)
+def has_possible_elements(named: Mapping[str, float]) -> bool:
+    """Return whether the parameters of added elements in `named`, by id, are within bounds."""
+    return all(abs(named.get(name, 0.0)) < SPECS[name].upper for name in ADDED_ELEMENT_IDS)
 
 
 def describe_model(

@@ -20,6 +20,13 @@ from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLa
 from drivetwin.estimation.result.method import Method
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, make_ratio_id
 from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.added_elements import (
+    ADDED_ELEMENT_IDS,
+    AddedElements,
+    Converter,
+    build_added_elements,
+    select_added_elements,
+)
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FrictionTable,
@@ -27,13 +34,6 @@ from drivetwin.simulation.dual_clutch import (
     RoadLoad,
     ShiftElement,
     Stribeck,
-)
-from drivetwin.simulation.vehicle_parts import (
-    PART_IDS,
-    Converter,
-    VehicleParts,
-    build_parts,
-    select_parts,
 )
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue, move_clutch_ratios
@@ -52,7 +52,7 @@ CAPACITY_SLOPE, CAPACITY_REFERENCE = "capacity_slope", "capacity_reference"
 SIMULATED = (
     *(*COMMON, "J_prime", *OF_ELEMENT, "ratio", FINAL_DRIVE, "te_delay", PRESSURE_DELAY),
     *(TORQUE_LAG, TORQUE_SHIFT, CAPACITY_SLOPE, CAPACITY_REFERENCE),
-    *PART_IDS,
+    *ADDED_ELEMENT_IDS,
 )
 """Stems of the parameters that a simulation depends on; the others follow from them."""
 
@@ -194,25 +194,27 @@ class Twin(DisplayMixin):
         )
 
     @property
-    def part_values(self) -> dict[str, float]:
-        """Parameters of the parts beside the dual clutch by id; empty where there are none."""
-        known = {name: self._is_known(name) for name in PART_IDS}
-        return select_parts({name: value for name, value in known.items() if value is not None})
+    def added_element_values(self) -> dict[str, float]:
+        """Parameters of the elements beside the dual clutch by id; empty where there are none."""
+        known = {name: self._is_known(name) for name in ADDED_ELEMENT_IDS}
+        return select_added_elements(
+            {name: value for name, value in known.items() if value is not None}
+        )
 
-    def build_parts(
+    def build_added_elements(
         self, model: DualClutch, overrides: Mapping[str, float] | None = None
-    ) -> VehicleParts:
-        """Build the parts beside the `model` of a shift.
+    ) -> AddedElements:
+        """Build the elements beside the `model` of a shift.
 
-        `overrides` sets parameters of the twin's parts by id; other ids have no effect.
+        `overrides` sets parameters of its added elements by id; other ids have no effect.
         """
         given = overrides or {}
-        own = {name: given.get(name, value) for name, value in self.part_values.items()}
-        return build_parts(own, model)
+        own = {name: given.get(name, value) for name, value in self.added_element_values.items()}
+        return build_added_elements(own, model)
 
-    def drop_part(self) -> Twin:
+    def drop_added_elements(self) -> Twin:
         """Return the twin with the dual clutch alone as its plant."""
-        kept = {name: one for name, one in self.parameters.items() if name not in PART_IDS}
+        kept = {name: one for name, one in self.parameters.items() if name not in ADDED_ELEMENT_IDS}
         return replace(self, parameters=kept)
 
     def list_model_ids(self, shift: Shift) -> tuple[str, ...]:

@@ -98,8 +98,8 @@ def _simulate_window(
     count = int((window[1] - window[0]) / _GRID + 1e-6)
     time = window[0] + _GRID * np.arange(count + 1, dtype=np.float64)
     start = state or estimate_start_state(model, log, shift, window[0])
-    parts = twin.build_parts(model)
-    task = DrivelineTask(model, parts, engine_torque, pressures, start, time)
+    added = twin.build_added_elements(model)
+    task = DrivelineTask(model, added, engine_torque, pressures, start, time)
     trajectory = task.simulate()
     validation = Validation(
         shift=shift,

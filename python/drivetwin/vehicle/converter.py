@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from drivetwin._util.toml import StrictModel
 from drivetwin.channels.units import RPM
-from drivetwin.simulation.vehicle_parts import Converter
+from drivetwin.simulation.added_elements import Converter
 
 _PER_1000RPM = 1000.0 * RPM
 

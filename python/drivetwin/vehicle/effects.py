@@ -48,7 +48,7 @@ class EffectPrior:
 def parse_sizes(texts: Iterable[str], option: str) -> dict[EffectId, float]:
     """Parse texts `NAME=SIZE`, such as `tyre_slip=0.004`, one for each effect.
 
-    Raises InputError at `option` for another form, and for a repeated or unknown name.
+    Raises InputError at `option` for another format, and for a repeated or unknown name.
     """
     where = Where(key=option)
     found: dict[EffectId, float] = {}

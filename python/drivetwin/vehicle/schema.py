@@ -281,7 +281,7 @@ def _refuse_percent(tolerance: float) -> float:
 
 class SensorTable(StrictModel):
     """`[sensors.<role>]`: standard deviations of a sensor's constant gain and offset errors, and of
-    the age of its values."""
+    the delay of its values."""
 
     gain_tolerance: Annotated[float, Field(ge=0), AfterValidator(_refuse_percent)] = 0.0
 
@@ -290,7 +290,7 @@ class SensorTable(StrictModel):
         return SensorTolerance(**{key.removesuffix("_tolerance"): one for key, one in self})
 
 
-Age = Annotated[float, Field(alias="age_tolerance_ms", ge=0), AfterValidator((1e-3).__mul__)]
+Delay = Annotated[float, Field(alias="delay_tolerance_ms", ge=0), AfterValidator((1e-3).__mul__)]
 
 
 class EngineTorqueSensor(SensorTable):
@@ -302,20 +302,20 @@ class EngineTorqueSensor(SensorTable):
 class TorqueSensor(EngineTorqueSensor):
     """Tolerances of a torque sensor."""
 
-    age_tolerance: Age = 0.0
+    delay_tolerance: Delay = 0.0
 
 
 class SpeedSensor(SensorTable):
     """Tolerances of a speed sensor."""
 
-    age_tolerance: Age = 0.0
+    delay_tolerance: Delay = 0.0
     offset_tolerance: Annotated[float, Field(alias="offset_tolerance_rpm", ge=0), IN_RPM] = 0.0
 
 
 class PressureSensor(SensorTable):
     """Tolerances of a pressure sensor."""
 
-    age_tolerance: Age = 0.0
+    delay_tolerance: Delay = 0.0
     offset_tolerance: Annotated[float, Field(alias="offset_tolerance_bar", ge=0), IN_BAR] = 0.0
 
 

@@ -51,12 +51,12 @@ class PriorValue:
 class SensorTolerance:
     """One standard deviation of a sensor's constant errors.
 
-    `gain` is relative, `offset` in SI; `age` [s] is how much older values are than their stamps.
+    `gain` is relative, `offset` in SI; `delay` [s] is how much older values are than their stamps.
     """
 
     gain: float = 0.0
     offset: float = 0.0
-    age: float = 0.0
+    delay: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from drivetwin.channels.read_options import ChannelSpec, RememberedMapping
 from drivetwin.errors import CardError, Where
+from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.dual_clutch import LossLaw
-from drivetwin.simulation.vehicle_parts import Converter
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import (
     ElementSpec,
@@ -30,7 +30,7 @@ class VehicleCard:
     is the inertia of the output side before the shaft (Jo' without drums), `J1` [kg m^2] that of
     the engine with what rotates with the gearbox input, None if unknown.
     `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
-    parameters.py), `effects` what is known of departures from the model. `converter` is the map of
+    parameters.py), `effects` what is known of unmodelled effects. `converter` is the map of
     the torque converter, None where the card has none. `remembered` is the mapping of the log of a
     twin that the card was made from.
     `source` is the file that it was read from and `sha256` that of its content; both empty where

@@ -19,18 +19,18 @@ from drivetwin.report.figures.validation import build_validation_panels
 from drivetwin.report.labels import get_parameter_name
 from drivetwin.report.style import COMPARED
 from drivetwin.shifts.shift import Shift
+from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     FrictionTable,
     ShiftElement,
     Stribeck,
 )
-from drivetwin.simulation.vehicle_parts import PART_IDS
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
 from drivetwin.workbench.zoom import View, encode_curves
 
-BESIDE_MODEL = ("te_delay", *PART_IDS)
+BESIDE_MODEL = ("te_delay", *ADDED_ELEMENT_IDS)
 """Parameters of a simulation that the dual-clutch model does not have."""
 FRICTION = "mu."
 """Prefix of the slider that scales the friction of an element; 1 as identified."""

@@ -91,8 +91,8 @@ def test_of_an_open_parameter_an_experiment_that_leaves_it_open_is_not_named() -
 def _followed_by_another_shift(found: Identification) -> Identification:
     """The identification as if its shift were followed by one to a gear 4, which K makes."""
     fit, signals = get_likelihood_fit(found)
-    (part,), (shown,) = fit.problem.parts, signals
-    first, record = part.structure, part.record
+    (term,), (shown,) = fit.problem.terms, signals
+    first, record = term.structure, term.record
     oncoming = replace(
         first.driveline.oncoming, name="K", a=5.0, b=6.0, gear="4"
     )  # a brake of ratio 1.2
@@ -109,12 +109,12 @@ def _followed_by_another_shift(found: Identification) -> Identification:
         if isinstance(one, dict)
     }
     second = replace(
-        part,
+        term,
         structure=replace(first, driveline=driveline, fixed=fixed),
         record=replace(record, **by_element),
     )
     shift = replace(shown.shift, start_gear="3", end_gear="4", offgoing="B3", oncoming="K")
-    problem = replace(fit.problem, parts=(part, second))
+    problem = replace(fit.problem, terms=(term, second))
     normal = replace(
         fit.normal,
         residuals=2 * tuple(fit.normal.residuals),
@@ -184,10 +184,10 @@ def _numbered(found: Identification, log: int) -> Identification:
     point = ParameterVector(
         tuple(own.get(name, name) for name in fit.point.names), fit.point.values
     )
-    parts = tuple(
-        replace(one, structure=replace(one.structure, log=log)) for one in fit.problem.parts
+    terms = tuple(
+        replace(one, structure=replace(one.structure, log=log)) for one in fit.problem.terms
     )
-    problem = replace(fit.problem, parts=parts)
+    problem = replace(fit.problem, terms=terms)
     evidence = replace(
         found.evidence,
         likelihood=replace(fit, problem=problem, point=point, mean=point),

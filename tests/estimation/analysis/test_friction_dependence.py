@@ -74,11 +74,11 @@ def test_slow_errors_of_a_sensor_make_a_departure_less_sure(
     monkeypatch.setattr(module, "_subtract_effects", lambda *_: None)
     found = stepped()
     fit, _ = get_likelihood_fit(found)
-    (residual,), (part,) = fit.normal.residuals, fit.problem.parts
-    count = part.record.outputs[0].values.size
+    (residual,), (term,) = fit.normal.residuals, fit.problem.terms
+    count = term.record.outputs[0].values.size
     held = np.repeat(np.random.default_rng(1).standard_normal(count // 50 + 1), 50)[:count]
     slow = residual.copy()
-    slow[:count] += part.record.sigma[:count] * held
+    slow[:count] += term.record.sigma[:count] * held
     wrong = replace(fit, normal=replace(fit.normal, residuals=(slow,)))
     evidence = replace(found.evidence, likelihood=wrong)
     sure, unsure = (

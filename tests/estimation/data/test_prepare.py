@@ -118,14 +118,14 @@ def test_rows_that_show_values_late_make_ages_uncertain() -> None:
     found = collect_tolerances(replace(log, channels=late), card, shift(100.0))
     spread = 0.01 / float(np.sqrt(12.0))
     assert found["output_torque"] == SensorTolerance(0.01, 30.0, float(np.hypot(4e-3, spread)))
-    assert found["engine_speed"] == found["pressure.B2"] == SensorTolerance(age=spread)
+    assert found["engine_speed"] == found["pressure.B2"] == SensorTolerance(delay=spread)
     assert "input_speed" not in found
     assert collect_tolerances(log, card, shift(100.0)) == card.sensors
 
 
 def test_what_is_older_has_the_values_of_before() -> None:
     signals = signals_of(drive(), shift(100.0))
-    older = apply_sensor_error(signals, "output_torque", SensorTolerance(age=2e-3)).output_torque
+    older = apply_sensor_error(signals, "output_torque", SensorTolerance(delay=2e-3)).output_torque
     assert older.time == pytest.approx(signals.output_torque.time + 2e-3)
     assert older.values == pytest.approx(signals.output_torque.values)
 

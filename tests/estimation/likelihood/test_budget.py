@@ -92,7 +92,7 @@ def test_a_stage_far_from_the_measurement_is_the_last() -> None:
             held = held.fix_parameter(k, heavy.values[k])
     # The lower gear alone shows that a vehicle of five times the mass is wrong.
     with limit_evaluations(24.0 * EXPANSION + 100.0 * RUN):
-        wrong = type(posed)(posed.parts, held, posed.lower, posed.upper)
+        wrong = type(posed)(posed.terms, held, posed.lower, posed.upper)
         assert find_staged_start(wrong, heavy, [made.signals.shift]) is None
 
 

@@ -24,15 +24,15 @@ FILTER = 0.8
 def _draws(fit: LikelihoodFit, count: int, slow: bool) -> FloatArray:
     """Sensor noise (n, count) of the fit's only shift; the output torque's of its power, filtered
     where it is `slow`."""
-    (part,) = fit.problem.parts
-    noise = np.random.default_rng(1).standard_normal((part.record.size, count))
-    torque = part.record.outputs[0]
+    (term,) = fit.problem.terms
+    noise = np.random.default_rng(1).standard_normal((term.record.size, count))
+    torque = term.record.outputs[0]
     assert torque.name == "output_torque"
     if slow:
         rows = slice(torque.values.size)
         gain = np.sqrt(1.0 - FILTER**2)
         noise[rows] = lfilter([gain], [1.0, -FILTER], noise[rows], axis=0)
-    return np.asarray(part.record.sigma[:, None] * noise)
+    return np.asarray(term.record.sigma[:, None] * noise)
 
 
 def _spread(fit: LikelihoodFit, residual: FloatArray) -> FloatArray:

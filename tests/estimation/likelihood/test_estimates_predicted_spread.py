@@ -16,14 +16,14 @@ from tests.estimation.likelihood.fixtures import fitted
 def test_samples_that_are_means_are_predicted_late_by_half_their_period() -> None:
     """The simulation is compared at the stamps, so the speed of the mean is that of the middle."""
     fit = fitted()
-    (part,) = fit.problem.parts
-    name = next(out.name for out in part.record.outputs if out.name != "output_torque")
-    means = replace(part, record=part.record.select_modes({name}))
-    run = part.simulate(fit.mean)
+    (term,) = fit.problem.terms
+    name = next(out.name for out in term.record.outputs if out.name != "output_torque")
+    means = replace(term, record=term.record.select_modes({name}))
+    run = term.simulate(fit.mean)
     assert run is not None
     averaged = replace(
         fit,
-        problem=replace(fit.problem, parts=(means,)),
+        problem=replace(fit.problem, terms=(means,)),
         normal=replace(fit.normal, residuals=(means.compute_residual(run),)),
     )
     key = "input_speed" if name == "engine_speed" else name

@@ -29,11 +29,11 @@ class _Lost(Whitener):
 
 def _weighted_by(posed: ShiftObjective, place: int | None) -> ShiftObjective:
     """The problem under that weighting; column 0 is the residual, then come the slopes."""
-    parts = (
+    terms = (
         replace(one, weighting=_Lost(one.weighting.variance, one.weighting.path, place))
-        for one in posed.parts
+        for one in posed.terms
     )
-    return replace(posed, parts=tuple(parts))
+    return replace(posed, terms=tuple(terms))
 
 
 def test_the_expansion_is_that_of_q() -> None:

@@ -38,29 +38,29 @@ def test_an_idle_drum_turns_with_the_shift() -> None:
     posed, point = build_problem(
         [made.signals], [driveline], "paper", {**truth_of(made), DRUM: 0.2}
     )
-    part = posed.parts[0]
+    term = posed.terms[0]
     assert DRUM in point.names
-    assert part.structure.build_model(point).elements[2].drum_inertia == 0.2
-    found = part.linearise(point)
+    assert term.structure.build_model(point).elements[2].drum_inertia == 0.2
+    found = term.linearise(point)
     assert found is not None
     k = point.names.index(DRUM)
     step = np.zeros(point.values.size)
     step[k] = 1e-3
-    runs = [part.simulate(point.replace_values(point.values + sign * step)) for sign in (1.0, -1.0)]
+    runs = [term.simulate(point.replace_values(point.values + sign * step)) for sign in (1.0, -1.0)]
     assert runs[0] is not None
     assert runs[1] is not None
-    slope = (part.record.sample_run(runs[0]) - part.record.sample_run(runs[1])) / 2e-3
-    before = part.record.time[part.record.outputs[0].place] < made.signals.shift.before[1] - 0.05
+    slope = (term.record.sample_run(runs[0]) - term.record.sample_run(runs[1])) / 2e-3
+    before = term.record.time[term.record.outputs[0].place] < made.signals.shift.before[1] - 0.05
     column = found[1][: before.size, k]
     assert np.linalg.norm((column - slope[: before.size])[before]) < 1e-3 * np.linalg.norm(
         slope[: before.size][before]
     )
     told = compute_parameters(posed, point, [made.signals])
     assert told["drum.K2"] == pytest.approx(0.2)
-    frequency, _ = compute_oscillation(part.structure, point)
+    frequency, _ = compute_oscillation(term.structure, point)
     assert (
         frequency
-        < compute_oscillation(part.structure, point.replace_values(point.values - 100.0 * step))[0]
+        < compute_oscillation(term.structure, point.replace_values(point.values - 100.0 * step))[0]
     )
 
 
@@ -70,7 +70,7 @@ def test_an_element_breaks_away_at_the_peak_that_the_card_states() -> None:
     elements = {**card.elements, "B3": replace(card.elements["B3"], peak=1.25)}
     driveline = build_driveline(replace(card, elements=elements), made.signals.shift)
     posed, point = build_problem([made.signals], [driveline], "paper", truth_of(made))
-    model = posed.parts[0].structure.build_model(point)
+    model = posed.terms[0].structure.build_model(point)
     assert {one.name: one.peak for one in model.elements} == {"B2": 1.0, "B3": 1.25}
 
 
@@ -103,13 +103,13 @@ def test_ratios_and_a_partners_friction_have_exact_derivatives(name: str) -> Non
     """The law of B2 follows that of B3, so that the unknowns of B3 move both elements."""
     made = bench()
     posed, point = build_problem([made.signals], [rough_driveline()], "paper", truth_of(made))
-    part, k = posed.parts[0], point.names.index(name)
-    found = part.linearise(point)
+    term, k = posed.terms[0], point.names.index(name)
+    found = term.linearise(point)
     assert found is not None
     step = np.zeros(point.values.size)
     step[k] = 1e-6 * max(abs(point[name]), 1.0)
-    runs = [part.simulate(point.replace_values(point.values + sign * step)) for sign in (1.0, -1.0)]
-    ahead, behind = (part.record.sample_run(run) for run in runs if run is not None)
+    runs = [term.simulate(point.replace_values(point.values + sign * step)) for sign in (1.0, -1.0)]
+    ahead, behind = (term.record.sample_run(run) for run in runs if run is not None)
     slope = (ahead - behind) / (2.0 * step[k])
     assert np.abs(found[1][:, k] - slope).max() < 1e-4 * np.abs(slope).max()
 
@@ -127,7 +127,7 @@ def test_the_law_of_the_offgoing_element_is_a_level_of_its_partners() -> None:
     values = point.values.copy()
     values[point.names.index("B2.level")], values[point.names.index("B2.rest")] = 1.1, 0.01
     moved = point.replace_values(values)
-    laws = {e.name: e.friction for e in posed.parts[0].structure.build_model(moved).elements}
+    laws = {e.name: e.friction for e in posed.terms[0].structure.build_model(moved).elements}
     own, partner = laws["B2"], laws["B3"]
     assert isinstance(own, Stribeck)
     assert isinstance(partner, Stribeck)

@@ -35,7 +35,7 @@ def _state(effect: EffectId) -> tuple[PriorValue, ...]:
 def test_a_rigid_part_leaves_the_dual_clutch(effect: EffectId) -> None:
     posed, start = problem(bench())
     extended, point = extend_problem(posed, start, effect, _state(effect))
-    plain, found = posed.parts[0].simulate(start), extended.parts[0].simulate(point)
+    plain, found = posed.terms[0].simulate(start), extended.terms[0].simulate(point)
     assert plain is not None
     assert found is not None
     largest = np.max(np.abs(plain.shaft_torque))
@@ -59,30 +59,30 @@ def test_derivatives_by_all_unknowns_are_exact(effect: EffectId) -> None:
     stated = EffectPriors({effect: EffectPrior(0.0, SIZES[effect])})
     priors = build_plant_priors(effect, stated, bench().driveline)
     extended, point = extend_problem(posed, start, effect, priors)
-    part = extended.parts[0]
-    found = part.linearise(point)
+    term = extended.terms[0]
+    found = term.linearise(point)
     assert found is not None
     residual, slopes = found
     assert residual.shape == (len(slopes),)
     for k, name in enumerate(point.names):
         if name in ("te_delay", "te_offset"):
             continue
-        size = float(np.linalg.norm(slopes[:, k] / part.record.sigma))
+        size = float(np.linalg.norm(slopes[:, k] / term.record.sigma))
         step = 0.3 / size if size else 1e-3
-        whole, half = (_difference(part, point, k, one) for one in (step, 0.5 * step))
-        miss = np.linalg.norm(((4.0 * half - whole) / 3.0 - slopes[:, k]) / part.record.sigma)
+        whole, half = (_difference(term, point, k, one) for one in (step, 0.5 * step))
+        miss = np.linalg.norm(((4.0 * half - whole) / 3.0 - slopes[:, k]) / term.record.sigma)
         # A lock that moves over a sample, and the points of a table, differ by less than 1 %. Play
         # that the torque does not cross does not act.
         assert size > 0.0 or effect is EffectId.BACKLASH, name
         assert miss <= 0.01 * size + 1e-6, name
 
 
-def _difference(part: ShiftTerm, point: ParameterVector, index: int, step: float) -> FloatArray:
+def _difference(term: ShiftTerm, point: ParameterVector, index: int, step: float) -> FloatArray:
     """Compute the central difference (n,) of the simulated samples by one unknown."""
     change = np.zeros_like(point.values)
     change[index] = step
-    runs = [part.simulate(point.replace_values(point.values + one)) for one in (change, -change)]
-    ahead, behind = (part.compute_residual(one) for one in runs if one is not None)
+    runs = [term.simulate(point.replace_values(point.values + one)) for one in (change, -change)]
+    ahead, behind = (term.compute_residual(one) for one in runs if one is not None)
     return np.asarray((behind - ahead) / (2.0 * step))
 
 

@@ -58,7 +58,7 @@ def test_a_fixed_gear_inertia_is_met_exactly() -> None:
 
 def test_the_core_is_told_how_a_tied_inertia_moves() -> None:
     problem, start = _posed({f"J_prime_{_first_gear()}": PriorValue(16.9)})
-    structure = problem.parts[0].structure
+    structure = problem.terms[0].structure
     varied = structure.build_model(start.to_variables()).J1
     assert isinstance(varied, Variable)
     for unknown in ("J_out", "eta"):
@@ -93,7 +93,7 @@ def test_a_prior_on_a_gear_inertia_is_one_on_the_sum() -> None:
 def test_what_is_fixed_is_no_unknown(name: str) -> None:
     problem, start = _posed({name: PriorValue(0.5)})
     assert name not in start.names
-    assert problem.parts[0].structure.get_value(start, name) == 0.5
+    assert problem.terms[0].structure.get_value(start, name) == 0.5
 
 
 def test_two_fixed_gear_inertias_are_refused() -> None:

@@ -46,7 +46,7 @@ def _with_J_out(value: float, known: PriorValue | None, sensors: float = 0.0) ->
     (shift,), signals = found.evidence.integral, found.evidence.signals
     values = shift.values.copy()
     values[shift.ids.index("J_out")] = value
-    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.terms[0].structure.driveline
     driveline = replace(driveline, J_out=known)
     return assess_shifts([replace(shift, values=values)], signals, [driveline], {"J_out": sensors})
 
@@ -83,7 +83,7 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
 ) -> None:
     found = stepped()
     (shift,), signals = found.evidence.integral, found.evidence.signals
-    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.terms[0].structure.driveline
     before = getattr(shift, stage)
     for chi2, verdict in (
         (0.9 * INTEGRAL_VERDICT.misfit_power, Verdict.IDENTIFIED),
@@ -100,7 +100,7 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
 def test_what_many_shifts_have_in_common_is_told_once(count: int, named: str) -> None:
     found = stepped()
     (shift,), (signals,) = found.evidence.integral, found.evidence.signals
-    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.terms[0].structure.driveline
     shifts, every = [], []
     for i in range(count):
         fit = replace(shift.load.fit, chi2=2.0 + i)
@@ -119,7 +119,7 @@ def test_what_many_shifts_have_in_common_is_told_once(count: int, named: str) ->
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:
     found = stepped()
     (shift,), signals = found.evidence.integral, found.evidence.signals
-    driveline = get_likelihood_fit(found)[0].problem.parts[0].structure.driveline
+    driveline = get_likelihood_fit(found)[0].problem.terms[0].structure.driveline
     name, design = f"P0.{driveline.oncoming.name}", PriorValue(8e4, 5e3)
     coupling = replace(driveline.oncoming, P0=design)
     couplings = {**driveline.couplings, coupling.name: coupling}

@@ -66,9 +66,9 @@ def test_slow_noise_of_a_sensor_counts_before_logs_disagree() -> None:
     assert compute_variance_inflation(fit, shared) == pytest.approx(max(fit.chi2, 1.0), rel=1e-6)
     rng = np.random.default_rng(1)
     slow = []
-    for part in fit.problem.parts:
-        noise = rng.standard_normal(part.record.size)
-        slow.append(part.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], noise))
+    for term in fit.problem.terms:
+        noise = rng.standard_normal(term.record.size)
+        slow.append(term.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], noise))
     loud = replace(fit, normal=replace(fit.normal, residuals=tuple(slow)))
     assert compute_variance_inflation(loud, shared) > 2.0
 

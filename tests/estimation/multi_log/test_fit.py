@@ -89,7 +89,7 @@ def test_the_log_that_shows_values_latest_tells_how_old_they_may_be(first: float
         channels = {r: replace(c, late=late) for r, c in one.log.channels.items()}
         prepared.append(prepare(replace(one.log, channels=channels), card(), one.shifts))
     tolerances = merge_tolerances(prepared)
-    assert tolerances["output_torque"].age == pytest.approx(0.01 / np.sqrt(12.0))
+    assert tolerances["output_torque"].delay == pytest.approx(0.01 / np.sqrt(12.0))
 
 
 def test_a_design_prior_counts_once() -> None:

@@ -89,38 +89,38 @@ def test_a_search_goes_along_kinks_to_their_crossing(start: list[float], height:
 
 @dataclass(frozen=True, eq=False)
 class LedOn(ShiftObjective):
-    """Q = 25·(a - formed - 1)²: formed anew at every point it leads on for ever. log|Σ| is least
-    where it was formed at 2."""
+    """Q = 25·(a - weighted_at - 1)²: reweighted at every point it leads on for ever. log|Σ| is
+    least where it was weighted at 2."""
 
-    formed: float = 0.0
+    weighted_at: float = 0.0
 
     @property
     def log_determinant(self) -> float:
         """log|Σ|."""
-        return 10.0 * (self.formed - 2.0) ** 2
+        return 10.0 * (self.weighted_at - 2.0) ** 2
 
     def cost(self, point: ParameterVector) -> float:
         """Q at a point."""
-        return float(25.0 * (point["a"] - self.formed - 1.0) ** 2)
+        return float(25.0 * (point["a"] - self.weighted_at - 1.0) ** 2)
 
     def normal(self, point: ParameterVector) -> NormalEquations:
         """The expansion of Q."""
         curvature = np.array([[25.0]])
-        gradient = curvature[0] * (point["a"] - self.formed - 1.0)
+        gradient = curvature[0] * (point["a"] - self.weighted_at - 1.0)
         return NormalEquations(self.cost(point), gradient, curvature, curvature, (), ())
 
 
 def test_a_weighting_that_leads_away_stays_as_it_was_where_that_was_likeliest() -> None:
     free = np.full(1, np.inf)
 
-    def formed_at(_: ShiftObjective, point: ParameterVector) -> ShiftObjective:
-        return LedOn((), Prior(np.zeros(1), np.zeros((1, 1))), -free, free, formed=point["a"])
+    def reweight_at(_: ShiftObjective, point: ParameterVector) -> ShiftObjective:
+        return LedOn((), Prior(np.zeros(1), np.zeros((1, 1))), -free, free, weighted_at=point["a"])
 
     start = ParameterVector(("a",), np.zeros(1))
     found = minimise(
-        formed_at(ShiftObjective((), Prior.from_independent(1, {}), -free, free), start),
+        reweight_at(ShiftObjective((), Prior.from_independent(1, {}), -free, free), start),
         start,
-        formed_at,
+        reweight_at,
     )
     assert found is not None
     assert found.converged

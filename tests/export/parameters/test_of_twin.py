@@ -12,8 +12,8 @@ from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.export.parameters.content import Curve, Scalar
 from drivetwin.export.parameters.of_twin import build_converter_curves, collect_parameters
 from drivetwin.parameters import OVER_ETA
+from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.dual_clutch import Stribeck
-from drivetwin.simulation.vehicle_parts import Converter
 from tests.export.parameters.sample import twin
 from tests.report.sample import STRIBECK
 

@@ -9,7 +9,7 @@ import pytest
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.targets import Names
-from drivetwin.simulation.vehicle_parts import Converter
+from drivetwin.simulation.added_elements import Converter
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
 

@@ -28,7 +28,7 @@ def test_a_time_is_told_in_ms_and_a_value_of_zero_in_no_per_cent() -> None:
 @pytest.mark.parametrize(("element", "angle"), [("B2", 0), ("Kupplung_K1", -90)])
 def test_names_that_are_wider_than_their_column_are_turned(element: str, angle: int) -> None:
     roles = ("engine_torque", f"pressure.{element}")
-    errors = tuple(f"{role} {kind}" for role in roles for kind in ("gain", "offset", "age"))
+    errors = tuple(f"{role} {kind}" for role in roles for kind in ("gain", "offset", "delay"))
     found = Sensitivity(
         ids=("eta",),
         values=np.array([0.85]),

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.driveline import SHAFT, build_driveline, build_start
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
@@ -20,7 +21,6 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.network import Element, Output, Sine, Start
-from drivetwin.simulation.vehicle_parts import NO_PARTS
 from tests.support.upshift.statement import Inputs, Problem, start
 
 _CLUTCHES = ("2", "3")
@@ -107,7 +107,9 @@ def build_scenario(of: Problem, given: Inputs) -> Scenario:
     return Scenario(
         build_driveline(model),
         signals,
-        build_start(model, NO_PARTS, build_state(of, given), signals[ENGINE_TORQUE], begin),
+        build_start(
+            model, NO_ADDED_ELEMENTS, build_state(of, given), signals[ENGINE_TORQUE], begin
+        ),
         given.time,
         OUTPUTS,
     )

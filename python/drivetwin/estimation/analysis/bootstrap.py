@@ -98,20 +98,20 @@ def bootstrap(found: Identification, count: int, seed: int) -> Bootstrap:
 
 def _draw_problem(base: LikelihoodFit, rng: np.random.Generator) -> ShiftObjective:
     """Draw the problem of a synthetic log, with new noise and new priors."""
-    parts = tuple(_draw_part(part, base, rng) for part in base.problem.parts)
+    terms = tuple(_draw_term(term, base, rng) for term in base.problem.terms)
     problem = base.problem
     prior = draw_prior(problem.prior, base.point.values, rng)
-    return replace(problem, parts=parts, prior=prior)
+    return replace(problem, terms=terms, prior=prior)
 
 
-def _draw_part(part: ShiftTerm, base: LikelihoodFit, rng: np.random.Generator) -> ShiftTerm:
+def _draw_term(term: ShiftTerm, base: LikelihoodFit, rng: np.random.Generator) -> ShiftTerm:
     """Draw one synthetic shift: exact outputs of the expected inputs, then noise on all."""
-    run = part.simulate(base.point)
+    run = term.simulate(base.point)
     assert run is not None
-    record = part.record
+    record = term.record
     noise = record.sigma * rng.standard_normal(record.size)
     return ShiftTerm.from_sensor_noise(
-        part.structure, _add_noise(record, record.sample_run(run), noise, rng)
+        term.structure, _add_noise(record, record.sample_run(run), noise, rng)
     )
 
 

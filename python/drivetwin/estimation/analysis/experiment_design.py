@@ -67,14 +67,14 @@ COAST = (6.0, -0.1)
 class BaseShift:
     """Shift that an experiment starts from: its part of the fit at the minimum, its lock-up [s]."""
 
-    part: ShiftTerm
+    term: ShiftTerm
     point: ParameterVector
     lockup: float
 
     @property
     def record(self) -> ShiftRecord:
         """Recorded data of the shift."""
-        return self.part.record
+        return self.term.record
 
     @property
     def largest(self) -> float:
@@ -84,22 +84,22 @@ class BaseShift:
 
 @dataclass(frozen=True, eq=False)
 class ExperimentPlan:
-    """An experiment as a part of a fit, with a start of its own at `point`."""
+    """An experiment as a term of a fit, with a start of its own at `point`."""
 
     experiment: Experiment
-    part: ShiftTerm
+    term: ShiftTerm
     point: ParameterVector
 
 
 def plan_experiment(experiment: Experiment, base: BaseShift) -> ExperimentPlan:
     """Build an experiment that starts like the log; its outputs hold no measurements."""
-    part, point = base.part, base.point
+    term, point = base.term, base.point
     label = "next"
-    starts = [name for name in point.names if name.startswith(f"{part.structure.label}.")]
+    starts = [name for name in point.names if name.startswith(f"{term.structure.label}.")]
     renamed = [f"{label}.{name.rpartition('.')[2]}" for name in starts]
     values = np.concatenate([point.values, [point[name] for name in starts]])
     extended = ParameterVector((*point.names, *renamed), values)
-    structure = replace(part.structure, label=label)
+    structure = replace(term.structure, label=label)
     record = _RECORDS[experiment](base)
     return ExperimentPlan(experiment, ShiftTerm.from_sensor_noise(structure, record), extended)
 
@@ -126,17 +126,17 @@ def _build_coast_down(base: BaseShift) -> ShiftRecord:
 
 
 def _build_torque_level(base: BaseShift) -> ShiftRecord:
-    elements = base.part.structure.elements
+    elements = base.term.structure.elements
     scaled = _scale_pressures(base, {one.name: TORQUE_LEVEL for one in elements})
     return _replace_torque(scaled, lambda _, values: TORQUE_LEVEL * values)
 
 
 def _build_firmer_shift(base: BaseShift) -> ShiftRecord:
-    return _scale_pressures(base, {base.part.structure.driveline.oncoming.name: FIRMER})
+    return _scale_pressures(base, {base.term.structure.driveline.oncoming.name: FIRMER})
 
 
 def _build_softer_shift(base: BaseShift) -> ShiftRecord:
-    return _scale_pressures(base, {base.part.structure.driveline.oncoming.name: SOFTER})
+    return _scale_pressures(base, {base.term.structure.driveline.oncoming.name: SOFTER})
 
 
 def _build_still_pedal(base: BaseShift) -> ShiftRecord:
@@ -165,7 +165,7 @@ def _scale_pressures(base: BaseShift, factors: Mapping[str, float]) -> ShiftReco
     """Multiply the pressures above P0 of some elements."""
     pressures = dict(base.record.pressures)
     for name, factor in factors.items():
-        P0 = base.part.structure.get_value(base.point, f"{name}.P0")
+        P0 = base.term.structure.get_value(base.point, f"{name}.P0")
         signal = pressures[name]
         values = np.where(signal.values > P0, P0 + factor * (signal.values - P0), signal.values)
         pressures[name] = Signal(signal.time, values)
@@ -185,7 +185,7 @@ def _replace_torque(
 
 def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> ShiftRecord:
     """Build a record of the off-going element's gear alone, with the rates and noise of the log."""
-    record, driveline = base.record, base.part.structure.driveline
+    record, driveline = base.record, base.term.structure.driveline
     step = float(np.median(np.diff(record.time)))
     time = step * np.arange(int(length / step), dtype=np.float64)
     period = float(np.median(np.diff(record.engine_torque.time)))
@@ -262,12 +262,12 @@ def compute_rankings(found: Identification) -> tuple[ExperimentRanking, ...]:
 def _find_shifts(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
     """Find the shifts whose experiments inform a parameter: the last one and, for an element's
     parameter, the last ones of the same log in which the element engages and disengages."""
-    parts = fit.problem.parts
-    last, element = len(parts) - 1, name.partition(".")[2]
+    terms = fit.problem.terms
+    last, element = len(terms) - 1, name.partition(".")[2]
     with_it: dict[bool, int] = {}
-    for k, one in enumerate(parts):
+    for k, one in enumerate(terms):
         structure = one.structure
-        if structure.log == parts[last].structure.log:
+        if structure.log == terms[last].structure.log:
             for role in structure.elements:
                 if role.name == element:
                     with_it[role is structure.driveline.oncoming] = k
@@ -312,7 +312,7 @@ def _compute_gains(
 ) -> list[_InformationGain]:
     """Compute the information of each experiment on shift k; failed simulations are left out."""
     point = _add_delay(fit)
-    base = BaseShift(fit.problem.parts[k], point, signals[k].shift.lockup_time)
+    base = BaseShift(fit.problem.terms[k], point, signals[k].shift.lockup_time)
     names = [f"{one.shift.start_gear}→{one.shift.end_gear}" for one in signals]
     label = names[k] if len(set(names)) > 1 else ""
     found = []
@@ -327,7 +327,7 @@ def _compute_gains(
 def _get_delay_name(fit: LikelihoodFit) -> str:
     """Return the name of the torque-delay unknown of the last log, whose sensors experiments
     share."""
-    return fit.problem.parts[-1].structure.get_unknown(DELAY)
+    return fit.problem.terms[-1].structure.get_unknown(DELAY)
 
 
 def _add_delay(fit: LikelihoodFit) -> ParameterVector:
@@ -335,12 +335,12 @@ def _add_delay(fit: LikelihoodFit) -> ParameterVector:
     point, name = fit.point, _get_delay_name(fit)
     if name in point.names:
         return point
-    delay = fit.problem.parts[-1].structure.get_value(point, DELAY)
+    delay = fit.problem.terms[-1].structure.get_value(point, DELAY)
     return ParameterVector((*point.names, name), np.append(point.values, delay))
 
 
 def _compute_gain(plan: ExperimentPlan, shift: str) -> _InformationGain | None:
-    weighted = plan.part.update_weighting(plan.point)
+    weighted = plan.term.update_weighting(plan.point)
     found = weighted.linearise(plan.point)
     if found is None:
         return None
@@ -383,7 +383,7 @@ class _Linearisation:
     def get_row(self, name: str, names: tuple[str, ...]) -> FloatArray:
         """Return the derivative (r,) of a parameter by the unknowns `names`."""
         row = np.zeros(len(names))
-        if name == make_log_id(DELAY, self.fit.problem.parts[-1].structure.log):
+        if name == make_log_id(DELAY, self.fit.problem.terms[-1].structure.log):
             row[names.index(_get_delay_name(self.fit))] = 1.0
             return row
         row[: len(self.fit.point.names)] = self.jacobian[list(self.values).index(name)]

@@ -137,7 +137,7 @@ def _compute_step(
 ) -> _Step:
     """Compute one step from the minimum; `known` (q,) is already in the residuals."""
     effects = [e for e in _iterate_effects(fit, largest, temperature) if e.plausible > 0.0]
-    columns = [_compute_columns(part, fit, effects, k) for k, part in enumerate(fit.problem.parts)]
+    columns = [_compute_columns(term, fit, effects, k) for k, term in enumerate(fit.problem.terms)]
     precision = np.array([e.plausible for e in effects]) ** -2.0
     score = compute_column_products(fit.problem, fit.normal, columns)
     normal = score.extend_expansion(fit.normal, precision, 0.0 if known is None else known)
@@ -150,11 +150,11 @@ def _compute_step(
 
 def _subtract_effects(fit: LikelihoodFit, step: _Step, total: FloatArray) -> LikelihoodFit | None:
     """Refit with the effects subtracted from the residuals; None if the fit fails."""
-    parts = tuple(
-        replace(part, returned=part.returned + z @ total)
-        for part, z in zip(fit.problem.parts, step.columns, strict=True)
+    terms = tuple(
+        replace(term, returned=term.returned + z @ total)
+        for term, z in zip(fit.problem.terms, step.columns, strict=True)
     )
-    found = minimise(replace(fit.problem, parts=parts), fit.point)
+    found = minimise(replace(fit.problem, terms=terms), fit.point)
     if found is None or not found.converged:
         return None
     return replace(fit, problem=found.problem, point=found.point, normal=found.normal)
@@ -164,12 +164,12 @@ def _iterate_effects(
     fit: LikelihoodFit, largest: float, temperature: MeasuredSignal | None
 ) -> Iterator[_Effect]:
     """Yield every deviation of every element."""
-    runs = [part.simulate(fit.point) for part in fit.problem.parts]
-    names = dict.fromkeys(e.name for part in fit.problem.parts for e in part.structure.elements)
+    runs = [term.simulate(fit.point) for term in fit.problem.terms]
+    names = dict.fromkeys(e.name for term in fit.problem.terms for e in term.structure.elements)
     for name in names:
         seen = [
-            evaluate_contact(part, fit.point, run, name)
-            for part, run in zip(fit.problem.parts, runs, strict=True)
+            evaluate_contact(term, fit.point, run, name)
+            for term, run in zip(fit.problem.terms, runs, strict=True)
             if run is not None
         ]
         slip = tuple(one.slip for one in seen)
@@ -193,19 +193,19 @@ def _build_level_effect(
     if not slipping.any() or np.ptp(values[slipping]) == 0.0:
         return _Effect(kind, name, (), 0.0)
     mean = float(np.average(values, weights=weights))
-    torques = tuple(one * (part - mean) for one, part in zip(contact, quantity, strict=True))
+    torques = tuple(one * (value - mean) for one, value in zip(contact, quantity, strict=True))
     return _Effect(kind, name, torques, DEPENDENCE.level_share / float(np.ptp(values[slipping])))
 
 
 def _compute_columns(
-    part: ShiftTerm, fit: LikelihoodFit, effects: list[_Effect], place: int
+    term: ShiftTerm, fit: LikelihoodFit, effects: list[_Effect], place: int
 ) -> FloatArray:
     """Compute the change (n, q) of the outputs of one part by a unit of each effect."""
-    run = part.simulate(fit.point)
+    run = term.simulate(fit.point)
     assert run is not None
     columns = []
     for effect in effects:
-        contact = evaluate_contact(part, fit.point, run, effect.element)
+        contact = evaluate_contact(term, fit.point, run, effect.element)
         force = contact.compute_forces(effect.torques[place])
-        columns.append(part.respond_to_forces(fit.point, run, force))
+        columns.append(term.respond_to_forces(fit.point, run, force))
     return np.column_stack(columns)

@@ -151,9 +151,9 @@ def _build_problem(
         names += table.list_names(name)
         values += law.evaluate(table.knots).tolist()
     point = ParameterVector(tuple(names), np.array(values))
-    parts = tuple(
-        _replace_laws(replace(part, record=_restore_inputs(part, s, span)), base, tables)
-        for part, s, span in zip(base.problem.parts, signals, split_spans(signals), strict=True)
+    terms = tuple(
+        _replace_laws(replace(term, record=_restore_inputs(term, s, span)), base, tables)
+        for term, s, span in zip(base.problem.terms, signals, split_spans(signals), strict=True)
     )
     size = point.values.size
     lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
@@ -164,13 +164,13 @@ def _build_problem(
     mean, precision = np.zeros(size), np.zeros((size, size))
     mean[: len(kept)] = base.problem.prior.mean[kept]
     precision[: len(kept), : len(kept)] = base.problem.prior.precision[np.ix_(kept, kept)]
-    return ShiftObjective(parts, Prior(mean, precision), lower, upper), point
+    return ShiftObjective(terms, Prior(mean, precision), lower, upper), point
 
 
 def _get_law(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
     """Return the friction law of an element at the minimum."""
-    for part in base.problem.parts:
-        for one in part.structure.build_model(base.point).elements:
+    for term in base.problem.terms:
+        for one in term.structure.build_model(base.point).elements:
             if one.name == name:
                 return one.friction
     raise IdentificationError(
@@ -179,20 +179,20 @@ def _get_law(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
 
 
 def _replace_laws(
-    part: ShiftTerm, base: LikelihoodFit, tables: Mapping[str, KnotTable]
+    term: ShiftTerm, base: LikelihoodFit, tables: Mapping[str, KnotTable]
 ) -> ShiftTerm:
-    """Replace the laws of a part by tables."""
-    old = part.structure
+    """Replace the laws of a term by tables."""
+    old = term.structure
     laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
     fixed = {**old.fixed, **{name: old.get_value(base.point, name) for name in laws}}
     mine = {one.name: tables[one.name] for one in old.elements if one.name in tables}
     structure = TableShiftModel(**{**vars(old), "fixed": fixed, "tables": mine})
-    return ShiftTerm.from_sensor_noise(structure, part.record)
+    return ShiftTerm.from_sensor_noise(structure, term.record)
 
 
-def _restore_inputs(part: ShiftTerm, signals: ShiftSignals, span: Span) -> ShiftRecord:
+def _restore_inputs(term: ShiftTerm, signals: ShiftSignals, span: Span) -> ShiftRecord:
     """Restore the inputs as measured: those of a fit are the expected ones."""
-    return build_record(signals, span, part.record.fills).select_modes(part.record.modes)
+    return build_record(signals, span, term.record.fills).select_modes(term.record.modes)
 
 
 def _build_prior(
@@ -203,10 +203,10 @@ def _build_prior(
     mean, precision = base.mean.copy(), base.precision.copy()
     for name, table in tables.items():
         first = point.names.index(table.list_names(name)[0])
-        part = slice(first, first + table.knots.size)
+        rows = slice(first, first + table.knots.size)
         second = np.diff(np.eye(table.knots.size), 2, axis=0) / bend
         on_mu = second.T @ second + np.eye(table.knots.size) / spread**2
-        precision[part, part], mean[part] = on_mu, level
+        precision[rows, rows], mean[rows] = on_mu, level
     return Prior(mean, precision)
 
 
@@ -239,11 +239,11 @@ def _build_curve(
     and effects."""
     name, table, shape = one
     first = corrected.mean.names.index(table.list_names(name)[0])
-    part = slice(first, first + table.knots.size)
+    rows = slice(first, first + table.knots.size)
     slip = np.linspace(float(seen.slip[0]), float(seen.slip[-1]), POINTS)
     between = np.array([np.interp(slip, table.knots, row) for row in np.eye(table.knots.size)]).T
     at_knots, spread = project_shape(
-        shape, corrected.mean.values[part], corrected.covariance[part, part]
+        shape, corrected.mean.values[rows], corrected.covariance[rows, rows]
     )
     mu = between @ at_knots
     half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))

@@ -114,7 +114,7 @@ def _divide(
     return PriorValue(factor * ratio, factor * std)
 
 
-NO_AGE = PriorValue(0.0)
+NO_DELAY = PriorValue(0.0)
 """Delay of a torque [s] that is computed from speeds."""
 
 
@@ -143,7 +143,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLo
         J_vehicle_range=card.J_vehicle_range,
         J_out=card.J_out,
         sensors=_collect_tolerances(log, first, card),
-        known=card.known if first is log else {**card.known, "te_delay": NO_AGE},
+        known=card.known if first is log else {**card.known, "te_delay": NO_DELAY},
         effects=card.effects,
     )
     return PreparedLog(
@@ -280,7 +280,7 @@ def _prepare_shift(
     driveline = build_driveline(card, shift)
     if referred is not log:
         whole = replace(whole, torque_of_speeds=_build_speed_torque(log, card, whole, sampler))
-        driveline = replace(driveline, known={**driveline.known, "te_delay": NO_AGE})
+        driveline = replace(driveline, known={**driveline.known, "te_delay": NO_DELAY})
     beside = SHIFT_SELECTION.kept_beside
     signals = _cut(whole, (shift.before[0] - beside, shift.after[1] + beside))
     return ShiftData(signals, refine_ratios(driveline, signals))
@@ -415,5 +415,7 @@ def _collect_tolerances(
             role = "engine_speed" if role == read else role
             one = found.get(role, SensorTolerance())
             # Anywhere within the row, so that the spread is that of an even distribution.
-            found[role] = replace(one, age=float(np.hypot(one.age, channel.late / np.sqrt(12.0))))
+            found[role] = replace(
+                one, delay=float(np.hypot(one.delay, channel.late / np.sqrt(12.0)))
+            )
     return found

@@ -40,14 +40,14 @@ _PROBED: WeakKeyDictionary[Whitener, dict[str, tuple[float, float]]] = WeakKeyDi
 """Result of the probes by weighting and name of the output: they do not depend on the residual."""
 
 
-def split_whitened(part: Term, residual: FloatArray) -> Iterator[tuple[Output, slice, FloatArray]]:
-    """Each output of a part, its rows among the samples (n,), and there the `residual` (n,) over
+def split_whitened(term: Term, residual: FloatArray) -> Iterator[tuple[Output, slice, FloatArray]]:
+    """Each output of a term, its rows among the samples (n,), and there the `residual` (n,) over
     the sensor's noise, input noise taken out. Of a right model that is white, of variance 1, or
     less at frequencies at which input noise explains a part of it.
     """
-    white = (residual - part.weighting.estimate_input_part(residual)) / part.record.sigma
+    white = (residual - term.weighting.estimate_input_share(residual)) / term.record.sigma
     first = 0
-    for out in part.record.outputs:
+    for out in term.record.outputs:
         rows = slice(first, first + out.values.size)
         first = rows.stop
         yield out, rows, white[rows]
@@ -75,17 +75,17 @@ def compute_long_run_excess(
     act through their power per frequency there.
     """
     found = np.zeros_like(normal.information)
-    for part, residual, regressors in zip(
-        problem.parts, normal.residuals, normal.regressors, strict=True
+    for term, residual, regressors in zip(
+        problem.terms, normal.residuals, normal.regressors, strict=True
     ):
-        for out, rows, white in split_whitened(part, residual):
+        for out, rows, white in split_whitened(term, residual):
             columns = out.sigma * regressors[rows]
-            excess = compute_slow_power(part, out, rows, white) - counted
+            excess = compute_slow_power(term, out, rows, white) - counted
             found += max(excess, 0.0) * columns.T @ columns
     return found
 
 
-def compute_slow_power(part: Term, out: Output, rows: slice, white: FloatArray) -> float:
+def compute_slow_power(term: Term, out: Output, rows: slice, white: FloatArray) -> float:
     """Power of a sensor's noise where the driveline is slow, over that stated; 1 where the block
     means of its residual `white` (n,) may as well be those of white noise.
 
@@ -93,28 +93,28 @@ def compute_slow_power(part: Term, out: Output, rows: slice, white: FloatArray) 
     found by probes: one of random sign for each block, weighted as the residual was. What is slower
     than a block, as a drift, counts with its power over a block, which is less than it does.
     """
-    _, means = compute_block_means(part.record.time[out.place], white)
+    _, means = compute_block_means(term.record.time[out.place], white)
     if means.size == 0:
         return 1.0
     power = float(np.mean(means**2))
-    known = _PROBED.setdefault(part.weighting, {})
+    known = _PROBED.setdefault(term.weighting, {})
     if out.name not in known:
-        known[out.name] = _by_probes(part, rows, _block(part.record.time[out.place]))
+        known[out.name] = _by_probes(term, rows, _block(term.record.time[out.place]))
     usual, own = known[out.name]
     if power < usual * (1.0 + COLOURED_NOISE.significant * np.sqrt(2.0 / means.size)):
         return 1.0
     return 1.0 + (power - usual) / own
 
 
-def _by_probes(part: Term, rows: slice, size: int) -> tuple[float, float]:
+def _by_probes(term: Term, rows: slice, size: int) -> tuple[float, float]:
     """Power of means over `size` samples that noise of inputs and sensors leaves of the output at
     `rows`, and how much of it is this sensor's."""
     count = (rows.stop - rows.start) // size
     held = slice(rows.start, rows.start + count * size)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(count, COLOURED_NOISE.probes))
-    probes = np.zeros((part.record.size, COLOURED_NOISE.probes))
+    probes = np.zeros((term.record.size, COLOURED_NOISE.probes))
     probes[held] = np.repeat(signs, size, axis=0) / np.sqrt(size)
-    sigma = part.record.sigma[:, None]
-    left = (probes - part.weighting.estimate_input_part(sigma * probes) / sigma)[held]
+    sigma = term.record.sigma[:, None]
+    left = (probes - term.weighting.estimate_input_share(sigma * probes) / sigma)[held]
     means = left.reshape(count, size, COLOURED_NOISE.probes).sum(axis=1) / np.sqrt(size)
     return float(np.mean(signs * means)), float(np.mean(means**2))

@@ -94,54 +94,54 @@ def predict_spread(
     """
     found: list[dict[str, PredictedSpread]] = []
     joint = corrected.joint_covariance
-    for part, slopes, z, residual in zip(
-        fit.problem.parts,
+    for term, slopes, z, residual in zip(
+        fit.problem.terms,
         fit.normal.slopes,
         corrected.step.columns.matrices
-        or [np.zeros((p.record.size, 0)) for p in fit.problem.parts],
+        or [np.zeros((p.record.size, 0)) for p in fit.problem.terms],
         corrected.residuals,
         strict=True,
     ):
-        run = part.simulate(corrected.mean)
+        run = term.simulate(corrected.mean)
         if run is None:
             found.append({})
             continue
-        averaged = part.record.sample_run(run) - part.record.sample_stamps(run)
-        mean = part.compute_residual(run) - residual + averaged
+        averaged = term.record.sample_run(run) - term.record.sample_stamps(run)
+        mean = term.compute_residual(run) - residual + averaged
         rows = np.column_stack([slopes, z])
-        variance = part.record.sigma**2 + np.einsum("np,pq,nq->n", rows, joint, rows)
-        if part.weighting.path is not None:
-            variance += _propagate_inputs(part, fit.point, part.weighting.path)
-        found.append(_split(part, mean, np.sqrt(variance)))
+        variance = term.record.sigma**2 + np.einsum("np,pq,nq->n", rows, joint, rows)
+        if term.weighting.path is not None:
+            variance += _propagate_inputs(term, fit.point, term.weighting.path)
+        found.append(_split(term, mean, np.sqrt(variance)))
     return tuple(found)
 
 
-def _propagate_inputs(part: ShiftTerm, point: ParameterVector, path: NoisePath) -> FloatArray:
+def _propagate_inputs(term: ShiftTerm, point: ParameterVector, path: NoisePath) -> FloatArray:
     """Compute the variance (n,) of the compared samples by the noise of the inputs."""
     response = path.response
     push = sum(
         path.power[name][:, None, None] * drive[:, :, None] * drive[:, None, :]
         for name, drive in response.drive.items()
     )
-    state = np.zeros((part.record.time.size, STATES, STATES))
+    state = np.zeros((term.record.time.size, STATES, STATES))
     for k, (step, change) in enumerate(zip(response.transition, np.asarray(push), strict=True)):
         state[k + 1] = step @ state[k] @ step.T + change
-    model = part.structure.build_model(point)
+    model = term.structure.build_model(point)
     found = []
-    for out in part.record.outputs:
+    for out in term.record.outputs:
         row = build_output_row(model, out.name)
         found.append(np.einsum("i,kij,j->k", row, state[out.centre], row))
     return np.concatenate(found)
 
 
-def _split(part: ShiftTerm, mean: FloatArray, std: FloatArray) -> dict[str, PredictedSpread]:
+def _split(term: ShiftTerm, mean: FloatArray, std: FloatArray) -> dict[str, PredictedSpread]:
     """Split stacked means and standard deviations (n,) by signal."""
     found, first = {}, 0
-    for out in part.record.outputs:
+    for out in term.record.outputs:
         rows = slice(first, first + out.values.size)
         first = rows.stop
         name = "input_speed" if out.name == "engine_speed" else out.name
-        found[name] = PredictedSpread(part.record.time[out.place], mean[rows], std[rows])
+        found[name] = PredictedSpread(term.record.time[out.place], mean[rows], std[rows])
     return found
 
 
@@ -296,7 +296,7 @@ def _check_levels(fit: LikelihoodFit, corrected: Correction) -> list[Finding]:
     """Report an element whose friction level contradicts that of its partner: one of the gains is
     likely wrong."""
     found = []
-    for name, partner in fit.problem.parts[0].structure.partners.items():
+    for name, partner in fit.problem.terms[0].structure.partners.items():
         unknown, prior = f"{name}.level", fit.problem.prior
         if unknown not in fit.point.names:
             continue
@@ -333,7 +333,7 @@ def _estimate_fixed(
         for name in list_absolute_ids(signals):
             ratio = estimates.get(name + OVER_ETA)
             found[name] = _estimate_without_scale(name, eta, ratio, drivelines[0].find_prior(name))
-    for one in (part.structure for part in fit.problem.parts):
+    for one in (term.structure for term in fit.problem.terms):
         if one.get_unknown(DELAY) not in fit.point.names and DELAY not in drivelines[0].known:
             name = make_log_id(DELAY, one.log)
             found[name] = refuse_parameter(name, METHOD, explain(Code.DELAY_NOT_EXCITED))
@@ -344,10 +344,10 @@ def _build_load_law(fit: LikelihoodFit, corrected: Correction) -> LoadLaw | None
     """Build the load law with its growth with speed; None if the fit has a constant load."""
     if AERO not in fit.point.names:
         return None
-    k, part = fit.point.names.index(AERO), fit.problem.parts[0]
+    k, term = fit.point.names.index(AERO), fit.problem.terms[0]
     std = float(np.sqrt(corrected.covariance[k, k]))
-    mean_speed = part.structure.mean_speed
-    return LoadLaw(corrected.mean[AERO], std, mean_speed, over_eta=not part.scale_known)
+    mean_speed = term.structure.mean_speed
+    return LoadLaw(corrected.mean[AERO], std, mean_speed, over_eta=not term.scale_known)
 
 
 def _estimate_without_scale(

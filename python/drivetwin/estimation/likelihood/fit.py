@@ -20,7 +20,7 @@ from drivetwin.vehicle.effects import EffectId
 
 @dataclass(frozen=True, eq=False)
 class PlantEvidence:
-    """Evidence of the part that the plant of a fit has beside the dual clutch.
+    """Evidence of the element that the plant of a fit has beside the dual clutch.
 
     `nats` is the log evidence against the dual clutch alone, `moves` (p,) are those of the unknowns
     from its minimum, `index` is that of the logarithm of the size among them.
@@ -39,7 +39,7 @@ class LikelihoodFit:
     `mean` is the minimum, or the average over minima of similar likelihood (sampling_mode.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
     the expansion of Q there. The covariance is that of `compute_covariance`. `plant` describes the
-    part that the plant has beside the dual clutch; its unknowns come last, that of the size first.
+    element beside the dual clutch; its unknowns come last, that of the size first.
     """
 
     problem: ShiftObjective
@@ -55,7 +55,7 @@ class LikelihoodFit:
     def deviance(self) -> float:
         """Q + log|Σ|: -2 log of likelihood times prior, up to a constant of the samples.
 
-        Σ is formed anew at the minimum: that of the search is of the point before, where noise
+        Σ is computed anew at the minimum: that of the search is of the point before, where noise
         about P0 opened an element at other instants, and log|Σ| was another by up to a thousand.
         It is no part of a search and counts as no work.
         """

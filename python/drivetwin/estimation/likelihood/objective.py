@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Likelihood objective: residuals of all recordings, their weighting, the priors.
 
-    Q(θ) = Σ_parts (y - ŷ(θ))ᵀ Σ⁻¹ (y - ŷ(θ)) + (θ - θ₀)ᵀ P₀⁻¹ (θ - θ₀)
+    Q(θ) = Σ_terms (y - ŷ(θ))ᵀ Σ⁻¹ (y - ŷ(θ)) + (θ - θ₀)ᵀ P₀⁻¹ (θ - θ₀)
 
 ŷ is the output of the core, its derivatives are the core's, exact through lock and break-away. Σ
 is held while θ moves.
@@ -91,10 +91,10 @@ class Term(Protocol):
         `point`; None if the simulation fails."""
 
     def update_weighting(self, point: ParameterVector) -> Self:
-        """Form the covariance of output and input noise at `point`."""
+        """Compute the covariance of output and input noise at `point`."""
 
     def update_inputs(self, point: ParameterVector) -> Self:
-        """Subtract the expected input noise at `point` from the inputs, and form the weighting
+        """Subtract the expected input noise at `point` from the inputs, and compute the weighting
         there."""
 
 
@@ -103,9 +103,9 @@ T = TypeVar("T", bound=Term)
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodObjective(Generic[T]):
-    """Likelihood of all parts, with prior and bounds `lower`, `upper` (p,) of their unknowns."""
+    """Likelihood of all terms, with prior and bounds `lower`, `upper` (p,) of their unknowns."""
 
-    parts: tuple[T, ...]
+    terms: tuple[T, ...]
     prior: Prior
     lower: FloatArray
     upper: FloatArray
@@ -113,32 +113,32 @@ class LikelihoodObjective(Generic[T]):
     @property
     def size(self) -> int:
         """Number of compared samples."""
-        return sum(part.record.size for part in self.parts)
+        return sum(term.record.size for term in self.terms)
 
     @property
     def log_determinant(self) -> float:
-        """log|Σ| of the weighting of all parts."""
-        return sum(part.weighting.log_determinant for part in self.parts)
+        """log|Σ| of the weighting of all terms."""
+        return sum(term.weighting.log_determinant for term in self.terms)
 
     def update_weighting(self, point: ParameterVector) -> Self:
-        """Form the covariance with input noise at `point`."""
+        """Compute the covariance with input noise at `point`."""
         charge(WEIGHTING)
-        return replace(self, parts=tuple(part.update_weighting(point) for part in self.parts))
+        return replace(self, terms=tuple(term.update_weighting(point) for term in self.terms))
 
     def update_inputs(self, point: ParameterVector) -> Self:
         """Drive the problem by the expected inputs at `point`, weighted there."""
-        return replace(self, parts=tuple(part.update_inputs(point) for part in self.parts))
+        return replace(self, terms=tuple(term.update_inputs(point) for term in self.terms))
 
     def cost(self, point: ParameterVector) -> float:
         """Compute Q; infinite if a simulation fails or Q is not a sum of squares."""
         charge(RUN)
         total = self.prior.compute_prior_cost(point.values)
-        for part in self.parts:
-            residual = part.evaluate(point)
+        for term in self.terms:
+            residual = term.evaluate(point)
             if residual is None:
                 return float("inf")
             with np.errstate(over="ignore", invalid="ignore"):
-                square = float(residual @ part.weighting.apply_inverse(residual))
+                square = float(residual @ term.weighting.apply_inverse(residual))
             if not _is_square(square):
                 return float("inf")
             total += square
@@ -156,9 +156,9 @@ class LikelihoodObjective(Generic[T]):
         charge(RUN)
         near = point.replace_values(point.values + share * step)
         total = np.zeros(step.size)
-        parts = zip(self.parts, normal.residuals, normal.slopes, normal.regressors, strict=True)
-        for part, residual, slopes, regressors in parts:
-            there = part.evaluate(near)
+        terms = zip(self.terms, normal.residuals, normal.slopes, normal.regressors, strict=True)
+        for term, residual, slopes, regressors in terms:
+            there = term.evaluate(near)
             if there is None:
                 return None
             bend = (residual - there) / share - slopes @ step
@@ -175,8 +175,8 @@ class LikelihoodObjective(Generic[T]):
         )
         data = np.zeros((size, size))
         residuals, regressors, every = [], [], []
-        for part in self.parts:
-            found = part.linearise(point)
+        for term in self.terms:
+            found = term.linearise(point)
             if found is None:
                 return None
             residual, slopes = found
@@ -184,7 +184,7 @@ class LikelihoodObjective(Generic[T]):
             own = slopes[:, acting]
             regressor = np.zeros_like(slopes)
             with np.errstate(over="ignore", invalid="ignore"):
-                weighted = part.weighting.apply_inverse(np.column_stack([residual, own]))
+                weighted = term.weighting.apply_inverse(np.column_stack([residual, own]))
                 regressor[:, acting] = weighted[:, 1:]
                 square = float(residual @ weighted[:, 0])
                 gradient[acting] -= own.T @ weighted[:, 0]

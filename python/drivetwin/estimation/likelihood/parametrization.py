@@ -31,6 +31,18 @@ from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
+from drivetwin.simulation.added_elements import (
+    BACKLASH,
+    MODE_DAMPING,
+    MODE_FREQUENCY,
+    MODE_SHARE,
+    PROGRESSION,
+    REFERENCE,
+    TYRE_SLIP,
+    AddedElements,
+    build_added_elements,
+    compute_gap,
+)
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     LossLaw,
@@ -40,18 +52,6 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.variable import exp
-from drivetwin.simulation.vehicle_parts import (
-    BACKLASH,
-    MODE_DAMPING,
-    MODE_FREQUENCY,
-    MODE_SHARE,
-    PROGRESSION,
-    REFERENCE,
-    TYRE_SLIP,
-    VehicleParts,
-    build_parts,
-    compute_gap,
-)
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue
 
@@ -214,8 +214,8 @@ class ShiftModel:
     @property
     def spinning(self) -> tuple[ShiftElementKinematics, ...]:
         """Elements open throughout whose drums turn with their slip all the same."""
-        taking_part = [one.name for one in self.elements]
-        return tuple(one for one in self.driveline.drums if one.name not in taking_part)
+        shifting = [one.name for one in self.elements]
+        return tuple(one for one in self.driveline.drums if one.name not in shifting)
 
     def get_value(self, point: ParameterVector, name: str) -> float:
         """Return the value of an unknown, free, fixed or tied."""
@@ -277,16 +277,18 @@ class ShiftModel:
             ),
         )
 
-    def compute_part_values(self, point: ParameterVector, model: DualClutch) -> dict[str, float]:
-        """Compute the parameters of the parts beside `model` by id at `point`."""
+    def compute_added_element_values(
+        self, point: ParameterVector, model: DualClutch
+    ) -> dict[str, float]:
+        """Compute the parameters of the elements beside `model` by id at `point`."""
         if self.plant_effect is None:
             return {}
         unknowns = {name: point[name] for name in self.plant_effect.unknowns}
         return self.plant_effect.compute_values(model, unknowns)
 
-    def build_parts(self, point: ParameterVector, model: DualClutch) -> VehicleParts:
-        """Build the parts beside `model` at `point`."""
-        return build_parts(self.compute_part_values(point, model), model)
+    def build_added_elements(self, point: ParameterVector, model: DualClutch) -> AddedElements:
+        """Build the elements beside `model` at `point`."""
+        return build_added_elements(self.compute_added_element_values(point, model), model)
 
     def _build_load(self, point: ParameterVector) -> RoadLoad:
         aero = self.get_value(point, AERO)

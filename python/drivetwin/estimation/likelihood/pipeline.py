@@ -147,7 +147,7 @@ def _fit(
     guess: Mapping[str, float],
     priors: EffectPriors,
 ) -> _SelectedFit:
-    """Fit the dual clutch, or a plant with a part beside it that the log supports.
+    """Fit the dual clutch, or a plant with an element beside it that the log supports.
 
     Raises IdentificationError where no plant reaches a plausible minimum.
     """
@@ -159,7 +159,7 @@ def _fit(
             if found is None:
                 raise
             best, notes = found, tuple(report_modes(found.problem.modes))
-    with _STAGES.enter("plant", "parts of the plant"):
+    with _STAGES.enter("plant", "elements of the plant"):
         admitted, warnings = admit_excluded(best, priors)
         return _SelectedFit(try_plants(best, admitted), admitted, (*notes, *warnings))
 

@@ -158,7 +158,7 @@ def build_problem(
     load_factors = (
         _build_load_factors(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
     )
-    parts, start = [], {n: guess.get(n, 0.0) for n in names}
+    terms, start = [], {n: guess.get(n, 0.0) for n in names}
     for k, (s, d, span) in enumerate(zip(signals, drivelines, split_spans(signals), strict=True)):
         label = f"start{k}"
         record = build_record(s, span, {e.name: e.P0 for e in (d.offgoing, d.oncoming)})
@@ -176,7 +176,7 @@ def build_problem(
             own_load,
             partners=partners,
         )
-        parts.append(ShiftTerm.from_sensor_noise(structure, record))
+        terms.append(ShiftTerm.from_sensor_noise(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
         torque = first.get("output_torque", guess["Tv_over_if"])
@@ -192,7 +192,7 @@ def build_problem(
     prior = Prior.from_independent(len(point.names), entries)
     sums = list_sum_priors(inertias, drivelines[0].J1, guess["eta"])
     prior = add_sum_priors(prior, point, fixed, sums)
-    return ShiftObjective(tuple(parts), prior, lower, upper), point
+    return ShiftObjective(tuple(terms), prior, lower, upper), point
 
 
 def _expand_logs(names: Sequence[str], logs: Sequence[int]) -> list[str]:

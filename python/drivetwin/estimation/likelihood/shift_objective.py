@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shifts in the likelihood: residuals, noise of inputs, parts of plants, products with columns."""
+"""Shifts in the likelihood: residuals, noise of inputs, added elements, products with columns."""
 
 from __future__ import annotations
 
@@ -82,8 +82,8 @@ def _compute_sensor_noise(model: DualClutch, record: ShiftRecord) -> FloatArray:
 
 
 OWN_REACH = 3.0
-"""Distance from their prior within which unknowns of a part are sought, in its standard deviations:
-a share of an inertia stays between 0 and 1 [-]."""
+"""Distance from their prior within which unknowns of an added element are sought, in its standard
+deviations: a share of an inertia stays between 0 and 1 [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class ShiftTerm:
     """One shift: its structure, what was recorded, and the weighting of its residuals.
 
     `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), what those held back
-    would do, 0 before the part is weighted by input noise.
+    would do, 0 before the term is weighted by input noise.
     """
 
     structure: ShiftModel
@@ -101,7 +101,7 @@ class ShiftTerm:
 
     @classmethod
     def from_sensor_noise(cls, structure: ShiftModel, record: ShiftRecord) -> ShiftTerm:
-        """Build a part whose residuals are weighted by the sensors' noise alone."""
+        """Build a term whose residuals are weighted by the sensors' noise alone."""
         return cls(structure, record, build_sensor_whitener(record.sigma))
 
     @property
@@ -122,7 +122,7 @@ class ShiftTerm:
         return any(out.name == "output_torque" for out in self.record.outputs)
 
     def simulate(self, point: ParameterVector) -> Trajectory | None:
-        """Simulate the part at `point`; None if the simulation fails or does not reach the end."""
+        """Simulate the term at `point`; None if the simulation fails or does not reach the end."""
         try:
             found = self.simulate_on(point, self.record.time)
         except (InputError, SimulationError):
@@ -135,7 +135,7 @@ class ShiftTerm:
         return None if run is None else self.compute_residual(run)
 
     def simulate_on(self, point: ParameterVector, time: FloatArray) -> Trajectory:
-        """Simulate the part on `time` (n,) [s]; a failed run returns its status.
+        """Simulate the term on `time` (n,) [s]; a failed run returns its status.
 
         Raises InputError or SimulationError for an impossible description.
         """
@@ -147,7 +147,7 @@ class ShiftTerm:
         model = self.structure.build_model(point)
         return DrivelineTask(
             model,
-            self.structure.build_parts(point, model),
+            self.structure.build_added_elements(point, model),
             torque,
             self.get_pressures(),
             self.structure.build_start(point),
@@ -155,7 +155,7 @@ class ShiftTerm:
         )
 
     def drop_plant_effect(self) -> ShiftTerm:
-        """Return the part with the dual clutch alone as its plant."""
+        """Return the term with the dual clutch alone as its plant."""
         return replace(self, structure=replace(self.structure, plant_effect=None))
 
     def _is_complete(self, run: Trajectory) -> bool:
@@ -230,17 +230,17 @@ class ShiftTerm:
             )
 
     def update_weighting(self, point: ParameterVector) -> ShiftTerm:
-        """Form the covariance of output and input noise at `point`.
+        """Compute the covariance of output and input noise at `point`.
 
-        Returns the part unchanged if the simulation fails there or has no finite response.
+        Returns the term unchanged if the simulation fails there or has no finite response.
         """
         return self._update_weighting(point) or self
 
     def update_inputs(self, point: ParameterVector) -> ShiftTerm:
-        """Subtract the expected input noise at `point` from the inputs, and form the weighting
+        """Subtract the expected input noise at `point` from the inputs, and compute the weighting
         there.
 
-        Returns the part unchanged if the simulation fails with the new inputs.
+        Returns the term unchanged if the simulation fails with the new inputs.
         """
         run = self.simulate(point)
         noise = (
@@ -255,7 +255,7 @@ class ShiftTerm:
         )
 
     def _update_weighting(self, point: ParameterVector) -> ShiftTerm | None:
-        """Form weighting and the effect of the held-back inputs at `point`; None if no run."""
+        """Compute weighting and the effect of the held-back inputs at `point`; None if no run."""
         run = self.simulate(point)
         if run is None:
             return None
@@ -272,7 +272,7 @@ class ShiftTerm:
         return replace(self, weighting=weighting, returned=returned)
 
     def add_to_inputs(self, point: ParameterVector, changes: Mapping[str, Signal]) -> ShiftTerm:
-        """Return the part driven by inputs with `changes` by name, at the instants at which they
+        """Return the term driven by inputs with `changes` by name, at the instants at which they
         act at `point`."""
         record, delay = self.record, self.structure.get_value(point, "te_delay")
         torque, pressures = record.engine_torque, dict(record.pressures)
@@ -312,16 +312,16 @@ class ShiftObjective(LikelihoodObjective[ShiftTerm]):
     @property
     def modes(self) -> frozenset[str]:
         """Names of the signals that are of another mode than read, as in `Record.modes`."""
-        return frozenset[str]().union(*(part.record.modes for part in self.parts))
+        return frozenset[str]().union(*(term.record.modes for term in self.terms))
 
     def extend(self, effect: PlantEffect, priors: Sequence[PriorValue]) -> ShiftObjective:
         """Add an effect to the plant of all shifts, with the `priors` of its unknowns.
 
         These come last. They stay within some standard deviations of their prior.
         """
-        structures = [replace(part.structure, plant_effect=effect) for part in self.parts]
-        parts = [
-            replace(part, structure=one) for part, one in zip(self.parts, structures, strict=True)
+        structures = [replace(term.structure, plant_effect=effect) for term in self.terms]
+        terms = [
+            replace(term, structure=one) for term, one in zip(self.terms, structures, strict=True)
         ]
         prior = self.prior
         for one in priors:
@@ -330,31 +330,31 @@ class ShiftObjective(LikelihoodObjective[ShiftTerm]):
         own = [one.value for one in priors]
         lower = np.append(self.lower, np.subtract(own, reach))
         upper = np.append(self.upper, np.add(own, reach))
-        return ShiftObjective(tuple(parts), prior, lower, upper)
+        return ShiftObjective(tuple(terms), prior, lower, upper)
 
     def drop_plant_effect(self) -> ShiftObjective:
-        """Return the problem of the dual clutch alone, without the unknowns of the part."""
-        effect = self.parts[0].structure.plant_effect
+        """Return the problem of the dual clutch alone, without unknowns of an added element."""
+        effect = self.terms[0].structure.plant_effect
         count = self.lower.size - (0 if effect is None else len(effect.unknowns))
         prior = Prior(self.prior.mean[:count], self.prior.precision[:count, :count])
-        parts = tuple(part.drop_plant_effect() for part in self.parts)
-        return ShiftObjective(parts, prior, self.lower[:count], self.upper[:count])
+        terms = tuple(term.drop_plant_effect() for term in self.terms)
+        return ShiftObjective(terms, prior, self.lower[:count], self.upper[:count])
 
     def select_modes(self, names: Collection[str]) -> ShiftObjective:
         """Set the sampling modes of all signals to those of `names`; all must be as read."""
-        parts = [
+        terms = [
             ShiftTerm.from_sensor_noise(p.structure, p.record.select_modes(names))
-            for p in self.parts
+            for p in self.terms
         ]
-        return replace(self, parts=tuple(parts))
+        return replace(self, terms=tuple(terms))
 
     def cut(self, ends: Sequence[float]) -> ShiftObjective:
-        """Cut each part at its end [s]; weighted by sensor noise."""
+        """Cut each term at its end [s]; weighted by sensor noise."""
         cut = [
-            ShiftTerm.from_sensor_noise(part.structure, part.record.cut(end))
-            for part, end in zip(self.parts, ends, strict=True)
+            ShiftTerm.from_sensor_noise(term.structure, term.record.cut(end))
+            for term, end in zip(self.terms, ends, strict=True)
         ]
-        return replace(self, parts=tuple(cut))
+        return replace(self, terms=tuple(cut))
 
     def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
         """Compute the values (p,) after a `step` (p,); friction laws move along their valley."""
@@ -363,10 +363,10 @@ class ShiftObjective(LikelihoodObjective[ShiftTerm]):
 
 @dataclass(frozen=True, eq=False)
 class ColumnProducts:
-    """Sums over all parts for q columns Z of the outputs, with J and r those of the fit.
+    """Sums over all terms for q columns Z of the outputs, with J and r those of the fit.
 
     `own` (q, q) is ZᵀΣ⁻¹Z, `cross` (p, q) JᵀΣ⁻¹Z and `pull` (q,) ZᵀΣ⁻¹r; `weighted` (n, q) is
-    Σ⁻¹Z of each part. With an amount s (q,) of the effects the residual is r - Z·s, and Q changes
+    Σ⁻¹Z of each term. With an amount s (q,) of the effects the residual is r - Z·s, and Q changes
     by sᵀ·own·s - 2·pull·s before the unknowns follow.
     """
 
@@ -400,14 +400,14 @@ class ColumnProducts:
 def compute_column_products(
     problem: ShiftObjective, normal: NormalEquations, columns: Sequence[FloatArray]
 ) -> ColumnProducts:
-    """Form the products of `columns` (n, q) of each part at the point of the expansion `normal`."""
+    """Compute the products of `columns` (n, q) of each term at the point of `normal`."""
     size = columns[0].shape[1]
     own, cross = np.zeros((size, size)), np.zeros((normal.gradient.size, size))
     pull, every = np.zeros(size), []
-    for part, z, residual, regressors in zip(
-        problem.parts, columns, normal.residuals, normal.regressors, strict=True
+    for term, z, residual, regressors in zip(
+        problem.terms, columns, normal.residuals, normal.regressors, strict=True
     ):
-        weighted = part.weighting.apply_inverse(z)
+        weighted = term.weighting.apply_inverse(z)
         own += z.T @ weighted
         cross += regressors.T @ z
         pull += weighted.T @ residual

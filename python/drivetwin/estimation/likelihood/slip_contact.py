@@ -19,11 +19,11 @@ SLIPPING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """One element in one part, over the steps (N-1,) of a run with their `middle` [s].
+    """One element in one term, over the steps (N-1,) of a run with their `middle` [s].
 
     `slip` [rad/s], pressure `above` P0 [Pa], `friction` of its law, and the torque `per_mu` [N m]
     that friction of 1 makes, with the sign of slip, 0 where the element is locked. `row` (4,) is
-    its slip as a row of the state. Of an element that the part does not have all are 0.
+    its slip as a row of the state. Of an element that the term does not have all are 0.
     """
 
     middle: FloatArray
@@ -39,18 +39,18 @@ class Contact:
 
 
 def evaluate_contact(
-    part: ShiftTerm, point: ParameterVector, run: Trajectory, name: str
+    term: ShiftTerm, point: ParameterVector, run: Trajectory, name: str
 ) -> Contact:
-    """Evaluate element `name` along `run`, the simulation of the part at `point`."""
+    """Evaluate element `name` along `run`, the simulation of the term at `point`."""
     middle = 0.5 * (run.time[1:] + run.time[:-1])
-    model = part.structure.build_model(point)
+    model = term.structure.build_model(point)
     one = next((e for e in model.elements if e.name == name), None)
-    if one is None or name not in part.record.pressures:
+    if one is None or name not in term.record.pressures:
         nothing = np.zeros(middle.size)
         return Contact(middle, nothing, nothing, nothing, nothing, np.zeros(4))
     slips = run.slip[name]
     slip = 0.5 * (slips[1:] + slips[:-1])
-    signal = part.record.pressures[name]
+    signal = term.record.pressures[name]
     above = np.maximum(np.interp(middle, signal.time, signal.values) - one.P0, 0.0)
     slipping = np.minimum(np.abs(slips[1:]), np.abs(slips[:-1])) > SLIPPING
     per_mu = np.where(slipping, np.sign(slip) * one.gain * above, 0.0)
@@ -59,12 +59,12 @@ def evaluate_contact(
     )
 
 
-def find_loaded_slips(part: ShiftTerm, point: ParameterVector, name: str) -> FloatArray:
+def find_loaded_slips(term: ShiftTerm, point: ParameterVector, name: str) -> FloatArray:
     """Sizes of the slip (n,) [rad/s] over the steps in which element `name` slips under pressure.
 
-    Empty where the part does not have it. `point` is one that can be simulated.
+    Empty where the term does not have it. `point` is one that can be simulated.
     """
-    run = part.simulate(point)
+    run = term.simulate(point)
     assert run is not None, "a fit can be simulated"
-    contact = evaluate_contact(part, point, run, name)
+    contact = evaluate_contact(term, point, run, name)
     return np.asarray(np.abs(contact.slip[contact.per_mu != 0.0]))

@@ -314,7 +314,7 @@ def estimate_systematic_std(
     signals: ShiftSignals,
     tolerances: Mapping[str, SensorTolerance],
 ) -> FloatArray:
-    """Standard deviation (q,) of `values` from the sensors' errors of gain, offset and age.
+    """Standard deviation (q,) of `values` from the sensors' errors of gain, offset and delay.
 
     Each tolerance is applied alone; the shifts of the result add in quadrature.
     """
@@ -333,7 +333,7 @@ def apply_sensor_error(signals: ShiftSignals, role: str, error: SensorTolerance)
 
     def changed(s: MeasuredSignal) -> MeasuredSignal:
         values = s.values * (1.0 + error.gain) + error.offset
-        return replace(s, time=s.time + error.age, values=values)
+        return replace(s, time=s.time + error.delay, values=values)
 
     name = get_pressure_element(role)
     if name is not None:

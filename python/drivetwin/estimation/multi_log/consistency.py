@@ -138,7 +138,7 @@ def check_consistency(
 
 def find_shared(fit: LikelihoodFit) -> list[int]:
     """Return the indices of the unknowns that all logs share."""
-    structures = [part.structure for part in fit.problem.parts]
+    structures = [term.structure for term in fit.problem.terms]
     own = {name for one in structures for name in map_log_names(one.log).values()}
     starts = {f"{one.label}.{key}" for one in structures for key in RUN_SPECIFIC}
     return [k for k, name in enumerate(fit.point.names) if name not in own | starts]
@@ -152,12 +152,12 @@ def _compute_column_products(
     Raises IdentificationError where a simulation that the fit had made does not run again.
     """
     size = len(fit.point.names)
-    parts = tuple(part for part in fit.problem.parts if part.structure.log == log)
+    terms = tuple(term for term in fit.problem.terms if term.structure.log == log)
     prior = fit.problem.prior
     own = [k for k, name in enumerate(fit.point.names) if name in map_log_names(log).values()]
     precision = np.zeros((size, size))
     precision[np.ix_(own, own)] = prior.precision[np.ix_(own, own)]
-    alone = replace(fit.problem, parts=parts, prior=Prior(prior.mean, precision))
+    alone = replace(fit.problem, terms=terms, prior=Prior(prior.mean, precision))
     normal = alone.normal(fit.point)
     if normal is None:
         raise IdentificationError(

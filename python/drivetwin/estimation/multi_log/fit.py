@@ -117,12 +117,12 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
 
 
 def merge_tolerances(logs: Sequence[PreparedLog]) -> dict[str, SensorTolerance]:
-    """Return the tolerances by role; all logs have the same sensors, the largest age counts."""
+    """Return the tolerances by role; all logs have the same sensors, the largest delay counts."""
     found: dict[str, SensorTolerance] = {}
     for log in logs:
         for role, own in log.design.sensors.items():
             known = found.get(role, own)
-            found[role] = replace(known, age=max(known.age, own.age))
+            found[role] = replace(known, delay=max(known.delay, own.delay))
     return found
 
 
@@ -147,7 +147,7 @@ def compute_start(alone: Sequence[Identification]) -> dict[str, float]:
     fits = [get_likelihood_fit(one)[0] for one in alone]
     values: dict[str, float] = {}
     for k, fit in enumerate(fits, 1):
-        structures = [part.structure for part in fit.problem.parts]
+        structures = [term.structure for term in fit.problem.terms]
         known = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
         known = {**structures[0].fixed, **known}
         own = {name: known.pop(name) for name in LOG_SPECIFIC if name in known}
@@ -178,7 +178,7 @@ _SharedMean = tuple[list[str], FloatArray, FloatArray]
 
 def _compute_shared_mean(fit: LikelihoodFit) -> _SharedMean:
     """Names, values (s,) and information (s, s) of what a log shares with others."""
-    starts = {f"{part.structure.label}.{key}" for part in fit.problem.parts for key in RUN_SPECIFIC}
+    starts = {f"{term.structure.label}.{key}" for term in fit.problem.terms for key in RUN_SPECIFIC}
     keep = [
         k for k, name in enumerate(fit.point.names) if name not in {*starts, *LOG_SPECIFIC, AERO}
     ]
@@ -219,7 +219,7 @@ def find_largest_differences(alone: Sequence[Identification]) -> list[str]:
 def _build_log_share(
     number: int, log: PreparedLog, alone: Identification, fit: LikelihoodFit
 ) -> LogShare:
-    mine = next(part for part in fit.problem.parts if part.structure.log == number)
+    mine = next(term for term in fit.problem.terms if term.structure.log == number)
     return LogShare(
         number, log.source, log.sha256, alone.shifts, alone.estimates, mine.structure.mean_speed
     )

@@ -98,18 +98,18 @@ def predict_shifts(
     return tuple(
         ShiftPrediction(
             known,
-            part.structure.mean_speed,
-            float(part.record.time[0]),
-            part.structure.build_start(point),
-            _compute_bounds(part, point, moved, rng) if _has_law(fit, part) else {},
+            term.structure.mean_speed,
+            float(term.record.time[0]),
+            term.structure.build_start(point),
+            _compute_bounds(term, point, moved, rng) if _has_law(fit, term) else {},
         )
-        for part in problem.parts
+        for term in problem.terms
     )
 
 
-def _has_law(fit: LikelihoodFit, part: ShiftTerm) -> bool:
+def _has_law(fit: LikelihoodFit, term: ShiftTerm) -> bool:
     """Return whether the fit identifies the friction of the on-coming element."""
-    return f"{part.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
+    return f"{term.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
 
 
 def _collect_values(fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]) -> dict[str, float]:
@@ -118,8 +118,8 @@ def _collect_values(fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]) ->
     Where neither has one, that of a usual facing.
     """
     known: dict[str, float] = {}
-    for part in fit.problem.parts:
-        known |= part.structure.fixed
+    for term in fit.problem.terms:
+        known |= term.structure.fixed
     known |= dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
     if AERO not in fit.point.names:
         known.pop(AERO, None)
@@ -139,7 +139,7 @@ def _find_new_unknowns(
 ) -> list[int]:
     """Return the indices of the unknowns that belong to the log or the run and are not in the
     fit."""
-    structures = [part.structure for part in problem.parts]
+    structures = [term.structure for term in problem.terms]
     starts = {f"{one.label}.{key}" for one in structures for key in START}
     own = {name for one in structures for name in map_log_names(one.log).values()}
     mine = starts | (own - set(fit.point.names))
@@ -207,23 +207,23 @@ def _compute_prior_variance(precision: float) -> float:
 
 
 def _compute_bounds(
-    part: ShiftTerm, point: ParameterVector, moved: FloatArray, rng: np.random.Generator
+    term: ShiftTerm, point: ParameterVector, moved: FloatArray, rng: np.random.Generator
 ) -> dict[str, PredictionInterval]:
     """Compute the error of each output over draws; empty if the shift cannot be simulated."""
-    part = part.update_weighting(point)
-    linear, run, path = part.linearise(point), part.simulate(point), part.weighting.path
+    term = term.update_weighting(point)
+    linear, run, path = term.linearise(point), term.simulate(point), term.weighting.path
     if linear is None or run is None or path is None:
         return {}
-    columns, response = linear[1] @ moved, part.compute_response(point, run)
-    rms: dict[str, list[float]] = {out.name: [] for out in part.record.outputs}
+    columns, response = linear[1] @ moved, term.compute_response(point, run)
+    rms: dict[str, list[float]] = {out.name: [] for out in term.record.outputs}
     for _ in range(PREDICTION.draws):
         noise = {name: np.sqrt(p) * rng.standard_normal(p.size) for name, p in path.power.items()}
-        error = part.observe(
+        error = term.observe(
             point, response.propagate_inputs(noise)
         ) + columns @ rng.standard_normal(columns.shape[1])
-        error = error + part.record.sigma * rng.standard_normal(error.size)
+        error = error + term.record.sigma * rng.standard_normal(error.size)
         first = 0
-        for out in part.record.outputs:
+        for out in term.record.outputs:
             piece = error[first : first + out.values.size]
             first += out.values.size
             rms[out.name].append(float(np.sqrt(np.mean(piece**2))))

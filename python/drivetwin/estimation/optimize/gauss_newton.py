@@ -64,7 +64,7 @@ class GaussNewtonSettings:
     """Ratio of actual to predicted decrease below which a step is bent along the valley; 0 for
     never [-]."""
     min_refreshes: int = 3
-    """Smallest number of points at which the weighting is formed anew [-]."""
+    """Smallest number of points at which the weighting is recomputed [-]."""
     patience: int = 3
     """Number of successive points without an increase of the likelihood (Q + log|Σ|) after which
     the weighting is frozen at the likeliest point, and of crawling steps after which a kink is
@@ -144,7 +144,7 @@ def _compute_scale(matrix: FloatArray) -> FloatArray:
 
 @dataclass(eq=False)
 class _Weighting(Generic[P]):
-    """Iteratively reweighted objective: formed anew at every point until `is_frozen`."""
+    """Iteratively reweighted objective: recomputed at every point until `is_frozen`."""
 
     refresh: Callable[[P, ParameterVector], P] | None
     patience: int
@@ -157,10 +157,10 @@ class _Weighting(Generic[P]):
         """Freeze a weighting that never changes."""
         self.is_frozen = self.refresh is None
 
-    def form(
+    def reweight(
         self, problem: P, point: ParameterVector
     ) -> tuple[P, ParameterVector, NormalEquations | None]:
-        """Form the objective at `point`; return the likeliest one once it has led away."""
+        """Reweight the objective at `point`; return the likeliest one once it has led away."""
         if self.is_frozen or self.refresh is None:
             return problem, point, problem.normal(point)
         problem = self.refresh(problem, point)
@@ -186,7 +186,7 @@ def minimise(
 ) -> OptimizeResult[C] | None:
     """Minimise Q from `start`; return None if the model cannot be evaluated there.
 
-    `refresh` forms Q anew at every point until the minimum is close (iterative reweighting).
+    `refresh` recomputes Q at every point until the minimum is close (iterative reweighting).
     A `rough` search ends when Q hardly decreases. The result is not converged after
     `max_iter` iterations, or after `screening_iter` iterations with Q above `limit`; its values
     are then no estimate.
@@ -196,7 +196,7 @@ def minimise(
     weighting = _Weighting(refresh, settings.patience)
     max_iter, crawls = settings.rough_max_iter if rough else settings.max_iter, 0
     for iteration in range(max_iter):
-        problem, point, normal = weighting.form(problem, point)
+        problem, point, normal = weighting.reweight(problem, point)
         if normal is None:
             return None
         expected = predict_decrease(problem, point, normal.information, normal.gradient)

@@ -67,7 +67,7 @@ class Cause:
     equivalent: tuple[Group, ...]
     next_evidence: float
     in_plant: bool = False
-    """True for a part that the identified plant has beside the dual clutch."""
+    """True for an element that the identified plant has beside the dual clutch."""
     is_explained: bool = True
 
     @property

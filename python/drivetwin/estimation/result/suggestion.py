@@ -27,9 +27,9 @@ class CardNumberKind(StrEnum):
 class CardNumber:
     """Number of a vehicle card that would narrow the interval of a parameter if it were exact.
 
-    `name` is a parameter id, the key of an effect, or `<role> gain`, `offset` or `age` of a sensor;
-    `subject` is the element or gear that has the effect. `share` is the width of the interval then
-    over the present width.
+    `name` is a parameter id, the key of an effect, or `<role> gain`, `offset` or `delay` of a
+    sensor; `subject` is the element or gear that has the effect. `share` is the width of the
+    interval then over the present width.
     """
 
     kind: CardNumberKind

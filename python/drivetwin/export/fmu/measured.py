@@ -19,8 +19,8 @@ from drivetwin.export.targets import DEFAULT_STEP
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
+from drivetwin.simulation.added_elements import describe_added_elements
 from drivetwin.simulation.dual_clutch import FloatArray
-from drivetwin.simulation.vehicle_parts import describe_parts
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import simulate_shift
 
@@ -61,8 +61,8 @@ def build_measured_subject(
         start=get_start_state(shift),
         note=build_note(twin, delays),
         delays=delays,
-        parts=twin.build_parts(shift.model),
-        part_names=describe_parts(twin.part_values),
+        added=twin.build_added_elements(shift.model),
+        added_element_names=describe_added_elements(twin.added_element_values),
     )
     return subject, Experiment(f"shift {name} of {source}", time, inputs, DEFAULT_STEP)
 

@@ -321,14 +321,14 @@ def format_modelica(
     if inputs is not None and time is not None:
         acting = subject.delays.torque_line
         torque = replace(inputs[ENGINE_TORQUE], delay=inputs[ENGINE_TORQUE].delay + acting)
-        start = build_start(subject.model, subject.parts, subject.start, torque, time[0])
+        start = build_start(subject.model, subject.added, subject.start, torque, time[0])
         run = Run(inputs, start, time)
     lines = subject.delays
     delays = {
         ENGINE_TORQUE: lines.torque_line,
         **{element.name: lines.pressure_line for element in subject.model.elements},
     }
-    network = build_driveline(subject.model, subject.parts)
+    network = build_driveline(subject.model, subject.added)
     return format_package(subject.name, network, run, note=subject.note, delays=delays)
 
 

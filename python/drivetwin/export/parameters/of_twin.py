@@ -20,8 +20,8 @@ from drivetwin.twin.twin import build_friction_law
 
 if TYPE_CHECKING:
     from drivetwin.estimation.result.estimate import Estimate
+    from drivetwin.simulation.added_elements import Converter
     from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
-    from drivetwin.simulation.vehicle_parts import Converter
     from drivetwin.twin.twin import Twin, TwinElement
 
 _RENAMED = {

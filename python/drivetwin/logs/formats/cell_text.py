@@ -288,7 +288,7 @@ def parse_time_texts(
 ) -> FloatArray:
     """Convert a column of texts to seconds (n,), clock times from the first.
 
-    Raises TimeError for the first cell of another form.
+    Raises TimeError for the first cell of another format.
     """
     if not is_clock(cells[0]):
         return _parse_durations(cells, lines, where)

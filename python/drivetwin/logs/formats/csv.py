@@ -3,7 +3,7 @@
 
 Delimiter `,` `;` `|`, tab or blanks; decimal point or comma; units in a row under or above the
 names or in the names as `EngTrq [Nm]`; comment lines (# % //), the last of which may hold the
-names; lines of another form above the names and between the rows; byte order mark; quoted fields;
+names; lines of another format above the names and between the rows; byte order mark; quoted fields;
 time as a number, a duration or a clock, with the date beside it, in one column or, as numbers, in
 one before each signal or group of signals, or one beside each signal. Empty cells are ignored, so
 that each column keeps its own time base. Tables of readings are read by `long_table`.

@@ -153,7 +153,7 @@ class Line:
 class TableHead:
     """Lines up to the first row: those `above` the names, the names, and those `below`.
 
-    Below stand units, comments or types; lines of another form are those `between`.
+    Below stand units, comments or types; lines of another format are those `between`.
 
     `first` is the number of the line of the first row that has numbers or would have; `rows` are
     the first rows.

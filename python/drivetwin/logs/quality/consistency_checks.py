@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin.channels.filling import Filling, FillKind
+from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.roles import AUXILIARY, get_quantity
 from drivetwin.channels.shiftlog import Channel, find_uncovered_ends
 from drivetwin.errors import PlausibilityError, TimeError, Where
@@ -29,7 +29,7 @@ def replace_filling(channel: Channel, filling: Filling | None) -> tuple[Channel,
     """
     if filling is None:
         return channel, []
-    if filling.kind is FillKind.UNKNOWN:
+    if filling.interpolation is Interpolation.UNKNOWN:
         return replace(channel, filling=filling), [report(Code.FILLING_UNKNOWN, "", channel.place)]
     period, step = Number(filling.period, "s"), Number(filling.step, "s")
     measured = replace(channel, time=filling.time, values=filling.values, filling=filling)
@@ -40,7 +40,7 @@ def replace_filling(channel: Channel, filling: Filling | None) -> tuple[Channel,
             channel.place,
             period=period,
             step=step,
-            kind=filling.kind.value,
+            interpolation=filling.interpolation.value,
         )
     ]
 

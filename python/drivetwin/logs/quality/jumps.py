@@ -30,7 +30,7 @@ def find_lost_messages(channel: Channel) -> Damage | None:
     if channel.quantity is not Quantity.SPEED:
         return None
     steep = _find_steep_steps(channel, np.diff(channel.time))
-    fresh, since = _measure_ages(channel)
+    fresh, since = _measure_delays(channel)
     usual = np.median(since[np.diff(channel.values) != 0.0]) if steep.size else 0.0
     known = np.isin(steep, _find_steep_steps(channel, since), invert=True)
     mask = np.zeros(channel.time.size, np.bool_)
@@ -46,7 +46,7 @@ def check_jumps(channel: Channel, where: Where) -> None:
     """
     if channel.quantity is not Quantity.SPEED:
         return
-    jumps = _find_steep_steps(channel, _measure_ages(channel)[1])
+    jumps = _find_steep_steps(channel, _measure_delays(channel)[1])
     if not jumps.size:
         return
     index = int(jumps[0]) + 1
@@ -70,7 +70,7 @@ def _find_steep_steps(channel: Channel, pause: FloatArray) -> NDArray[np.intp]:
     return np.flatnonzero(close & (change > MAX_JUMP) & (change > fastest * pause))
 
 
-def _measure_ages(channel: Channel) -> tuple[NDArray[np.intp], FloatArray]:
+def _measure_delays(channel: Channel) -> tuple[NDArray[np.intp], FloatArray]:
     """Return where the value of each sample appeared, and the time [s] from there to the next.
 
     Both are of shape (n-1,).

@@ -11,7 +11,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display, format_significant
 from drivetwin.estimation.likelihood.coloured_noise import compute_block_means
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
-    AGE,
+    DELAY,
     FRICTION,
     SIZE,
     Sensitivity,
@@ -57,7 +57,7 @@ def plot_residuals(
 _KINDS = {
     "gain": f"gain + {100 * SIZE:g} %",
     "offset": f"offset of {100 * SIZE:g} % of the largest",
-    "age": f"values {1e3 * AGE:g} ms older",
+    "delay": f"values {1e3 * DELAY:g} ms older",
 }
 """Kinds of errors with their titles, from left to right."""
 _FULL_COLOUR = 3.0

@@ -66,7 +66,7 @@ _STRETCHES = {
 
 
 _SCAN_VIEW = 0.025
-"""Ages shown on either side of the best one [s]."""
+"""Delays shown on either side of the best one [s]."""
 
 
 def plot_momentum(fit: MomentumFit) -> Figure:
@@ -107,7 +107,7 @@ def _add_scan(figure: Figure, fit: MomentumFit) -> None:
     if scan.best is not None:
         shown = np.abs(scan.delay - scan.best) <= _SCAN_VIEW
     figure.merge_layout(
-        xaxis2=make_axis("assumed age of T_e [ms]"),
+        xaxis2=make_axis("assumed delay of T_e [ms]"),
         yaxis2=make_axis("misfit Q − min Q [–]", rangemode="tozero"),
     )
     figure.add_scatter(

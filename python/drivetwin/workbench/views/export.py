@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Export: a button for every form that a twin has, and for drivetwin's own files."""
+"""Export: a button for every format that a twin has, and for drivetwin's own files."""
 
 from __future__ import annotations
 

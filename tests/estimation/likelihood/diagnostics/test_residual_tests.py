@@ -28,14 +28,14 @@ def _list_correlated(fit: LikelihoodFit) -> list[Finding]:
 def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None:
     fit = fitted()
     assert not _list_correlated(fit)
-    (part,), (residual,) = fit.problem.parts, fit.normal.residuals
-    drive = part.record.engine_torque
-    torque = part.record.outputs[0]
+    (term,), (residual,) = fit.problem.terms, fit.normal.residuals
+    drive = term.record.engine_torque
+    torque = term.record.outputs[0]
     missing = np.zeros_like(residual)
-    shown = np.interp(part.record.time[torque.place], drive.time, drive.values)
+    shown = np.interp(term.record.time[torque.place], drive.time, drive.values)
     missing[: torque.values.size] = torque.sigma * (shown - shown.mean()) / shown.std()
     plain = replace(
-        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record.sigma)),)
+        fit.problem, terms=(replace(term, weighting=build_sensor_whitener(term.record.sigma)),)
     )
     wrong = replace(fit, problem=plain, normal=replace(fit.normal, residuals=(residual + missing,)))
     (one,) = _list_correlated(wrong)
@@ -50,8 +50,8 @@ def test_a_residual_that_goes_with_an_input_speaks_against_every_value() -> None
 def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
     """By twice its noise over the log."""
     fit = fitted()
-    (part,), (residual,) = fit.problem.parts, fit.normal.residuals
-    torque = part.record.outputs[0]
+    (term,), (residual,) = fit.problem.terms, fit.normal.residuals
+    torque = term.record.outputs[0]
     drift = np.zeros_like(residual)
     drift[: torque.values.size] = torque.sigma * np.linspace(-1.0, 1.0, torque.values.size)
     drifted = replace(fit, normal=replace(fit.normal, residuals=(residual + drift,)))
@@ -66,9 +66,9 @@ def test_the_drift_of_a_sensor_speaks_against_every_value() -> None:
 def test_a_fit_that_leaves_out_the_noise_of_its_inputs_says_so() -> None:
     fit, made = fitted(), bench()
     assert check_weighting(fit, ["shift 2-3"]) == []
-    (part,) = fit.problem.parts
+    (term,) = fit.problem.terms
     bare = replace(
-        fit.problem, parts=(replace(part, weighting=build_sensor_whitener(part.record.sigma)),)
+        fit.problem, terms=(replace(term, weighting=build_sensor_whitener(term.record.sigma)),)
     )
     told = build_estimates(
         replace(fit, problem=bare), [made.signals], [made.driveline], {}, EffectPriors()

@@ -35,7 +35,7 @@ SMALL = 1e-3
 @shared
 def operating_point() -> OperatingPoint:
     fit = fitted()
-    found = evaluate_operating_point(fit.problem.parts[0], fit.point)
+    found = evaluate_operating_point(fit.problem.terms[0], fit.point)
     assert found is not None
     return found
 
@@ -49,13 +49,13 @@ def answer(effect: EffectId, size: float = 1.0) -> FloatArray:
 def difference(change: Callable[[DualClutch, Signal], tuple[DualClutch, Signal]]) -> FloatArray:
     """Change of the compared samples of a simulation by `change` of model and engine torque."""
     at = operating_point()
-    part = at.part
-    torque = part.get_acting_torque(at.point)
+    term = at.term
+    torque = term.get_acting_torque(at.point)
     runs = []
     for model, signal in ((at.model, torque), change(at.model, torque)):
-        start = part.structure.build_start(at.point)
-        run = simulate(model, signal, part.get_pressures(), start, part.record.time)
-        runs.append(part.record.sample_run(run))
+        start = term.structure.build_start(at.point)
+        run = simulate(model, signal, term.get_pressures(), start, term.record.time)
+        runs.append(term.record.sample_run(run))
     return np.asarray(runs[1] - runs[0])
 
 
@@ -93,7 +93,7 @@ def test_drums_are_inertias_that_turn_with_the_slip() -> None:
 
 def test_a_load_that_grows_with_speed_holds_at_the_mean_speed() -> None:
     at = operating_point()
-    speed = at.part.structure.mean_speed
+    speed = at.term.structure.mean_speed
     share = SMALL * EFFECTS[EffectId.AERO_LOAD].std * at.load * at.model.i_f
     load = at.model.load
 

@@ -40,7 +40,7 @@ def test_the_slower_torque_is_the_lagged_faster_one(size: float) -> None:
     """
     at = operating_point()
     steady, time = at.record.steady_torque, at.middle
-    age = at.part.structure.get_value(at.point, "te_delay")
+    age = at.term.structure.get_value(at.point, "te_delay")
     fine = np.arange(time[0], time[-1], 2e-4)
     logged = np.interp(fine + age, steady.time, steady.values)
     (found,) = build_torque_lag(at, size)
@@ -57,8 +57,8 @@ def test_the_slower_torque_is_the_lagged_faster_one(size: float) -> None:
 
 def test_a_positive_delay_acts_later_than_the_logged_pressure() -> None:
     fit = fitted()
-    (part,) = fit.problem.parts
-    at = evaluate_operating_point(part, fit.point)
+    (term,) = fit.problem.terms
+    at = evaluate_operating_point(term, fit.point)
     assert at is not None
     for one in build_pressure_delay(at, LATE):
         signal = bench().signals.pressures[one.subject]

@@ -26,7 +26,7 @@ MARGIN = 0.02
 @pytest.fixture(scope="module")
 def at() -> OperatingPoint:
     posed, point = problem(bench(noise=0.0))
-    found = evaluate_operating_point(posed.parts[0], point)
+    found = evaluate_operating_point(posed.terms[0], point)
     assert found is not None
     return found
 
@@ -45,7 +45,7 @@ def integrate(
         slip = ratio / (model.i_in * one.i_c) - one.i_out  # slip per output speed, of the open one
         output += one.drum_inertia * slip**2
     first, length = at.run.time[0], at.duration
-    drag = STD * abs(at.part.structure.get_value(at.point, "Tv_over_if")) * model.i_f
+    drag = STD * abs(at.term.structure.get_value(at.point, "Tv_over_if")) * model.i_f
 
     def shaft(z: FloatArray) -> FloatArray:
         return np.asarray(model.k_o * z[2] + model.c_o * (z[0] - model.i_f * z[1]))
@@ -120,7 +120,7 @@ def test_without_fading_the_column_is_a_change_of_the_load(at: OperatingPoint) -
     for sign in (1.0, -1.0):
         values = at.point.values.copy()
         values[k] *= 1.0 + sign * STD
-        run = at.part.simulate(at.point.replace_values(values))
+        run = at.term.simulate(at.point.replace_values(values))
         assert run is not None
         samples.append(at.record.sample_run(run))
     found = 0.5 * (samples[0] - samples[1])

@@ -22,17 +22,17 @@ from tests.estimation.likelihood.fixtures import bench, fitted, problem
 
 def _short() -> tuple[ShiftTerm, ParameterVector]:
     posed, start = problem(bench())
-    part = posed.parts[0]
+    term = posed.terms[0]
     return ShiftTerm.from_sensor_noise(
-        part.structure, part.record.cut(part.record.time[0] + 0.15)
+        term.structure, term.record.cut(term.record.time[0] + 0.15)
     ), start
 
 
 def test_weighting_equals_the_dense_covariance() -> None:
-    part, point = _short()
-    run = part.simulate(point)
+    term, point = _short()
+    run = term.simulate(point)
     assert run is not None
-    model, record = part.structure.build_model(point), part.record
+    model, record = term.structure.build_model(point), term.record
     response = linearise_run(model, run, record)
     whiteness = weight_by_inputs(model, record, response)
     assert whiteness.path is not None
@@ -56,20 +56,20 @@ def test_weighting_equals_the_dense_covariance() -> None:
     assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
 
 
-def _of_speeds(part: ShiftTerm, slope: float, rest: float) -> ShiftTerm:
+def _of_speeds(term: ShiftTerm, slope: float, rest: float) -> ShiftTerm:
     """The part with an engine torque computed from ω_e, on which it hangs by `slope`."""
-    record, read = part.record, part.record.engine_torque
+    record, read = term.record, term.record.engine_torque
     torque = Signal(record.time, np.interp(record.time, read.time, read.values))
     size = np.linspace(0.5, 1.5, record.time.size)
     share = TorqueOfSpeeds(record.time, size * slope, size * rest)
     sigma = {**record.input_sigma, TORQUE: rest}
     made = replace(record, engine_torque=torque, of_speeds=share, input_sigma=sigma, rounding={})
-    return replace(part, record=made)
+    return replace(term, record=made)
 
 
-def _torque_by_speed(part: ShiftTerm) -> FloatArray:
+def _torque_by_speed(term: ShiftTerm) -> FloatArray:
     """Noise of the engine torque over each step per that of a compared sample (N-1, n)."""
-    record, torque = part.record, part.record.engine_torque.time
+    record, torque = term.record, term.record.engine_torque.time
     assert record.of_speeds is not None
     middle, columns = 0.5 * (record.time[1:] + record.time[:-1]), []
     for out in record.outputs:
@@ -82,11 +82,11 @@ def _torque_by_speed(part: ShiftTerm) -> FloatArray:
 
 
 def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
-    part, point = _short()
-    part = _of_speeds(part, slope=-400.0, rest=2.0)
-    run = part.simulate(point)
+    term, point = _short()
+    term = _of_speeds(term, slope=-400.0, rest=2.0)
+    run = term.simulate(point)
     assert run is not None
-    model, record = part.structure.build_model(point), part.record
+    model, record = term.structure.build_model(point), term.record
     response = linearise_run(model, run, record)
     whiteness = weight_by_inputs(model, record, response)
     assert whiteness.path is not None
@@ -94,8 +94,8 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     for name in response.drive:
         steps = np.eye(record.time.size - 1)
         answers = [response.propagate_inputs({name: step}) for step in steps]
-        effect[name] = np.column_stack([part.observe(point, z) for z in answers])
-    share, power = _torque_by_speed(part), whiteness.path.power
+        effect[name] = np.column_stack([term.observe(point, z) for z in answers])
+    share, power = _torque_by_speed(term), whiteness.path.power
     assert power[TORQUE][[0, -1]] == pytest.approx(np.array([1.0, 9.0]), rel=0.1)
     own = np.eye(record.size) - effect[TORQUE] @ share
     dense = own @ np.diag(record.sigma**2) @ own.T
@@ -112,12 +112,12 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
 
 
 def test_its_determinant_is_that_of_the_dense_covariance() -> None:
-    part, point = _short()
-    weighting = part.update_weighting(point).weighting
+    term, point = _short()
+    weighting = term.update_weighting(point).weighting
     assert weighting.path is not None
-    dense = np.linalg.inv(weighting.apply_inverse(np.eye(part.record.size)))
-    sensors = part.weighting.log_determinant
-    assert sensors == pytest.approx(2.0 * np.sum(np.log(part.record.sigma)), rel=1e-12)
+    dense = np.linalg.inv(weighting.apply_inverse(np.eye(term.record.size)))
+    sensors = term.weighting.log_determinant
+    assert sensors == pytest.approx(2.0 * np.sum(np.log(term.record.sigma)), rel=1e-12)
     more = weighting.log_determinant - sensors
     assert more > 1.0
     expected = np.linalg.slogdet(0.5 * (dense + dense.T)).logabsdet
@@ -128,8 +128,8 @@ def _sparse(every: int) -> tuple[ShiftTerm, ParameterVector]:
     """A shift up to lock-up of which outputs and pressures show one sample in so many."""
     made = bench()
     posed, start = problem(made)
-    part = posed.cut([made.signals.shift.lockup_time - 0.02]).parts[0]
-    record = part.record
+    term = posed.cut([made.signals.shift.lockup_time - 0.02]).terms[0]
+    record = term.record
     outputs = tuple(
         Output(out.name, out.place[::every], out.values[::every], out.sigma)
         for out in record.outputs
@@ -139,14 +139,14 @@ def _sparse(every: int) -> tuple[ShiftTerm, ParameterVector]:
     }
     sigma = {**record.input_sigma, TORQUE: 0.03}
     sparse = replace(record, outputs=outputs, pressures=pressures, input_sigma=sigma, held_back={})
-    return ShiftTerm.from_sensor_noise(part.structure, sparse).update_weighting(start), start
+    return ShiftTerm.from_sensor_noise(term.structure, sparse).update_weighting(start), start
 
 
-def _filtered(part: ShiftTerm, point: ParameterVector, columns: FloatArray) -> FloatArray:
+def _filtered(term: ShiftTerm, point: ParameterVector, columns: FloatArray) -> FloatArray:
     """Products (q, q) of columns (n, q) weighted by a Kalman filter, sample after sample."""
-    path, record = part.weighting.path, part.record
+    path, record = term.weighting.path, term.record
     assert path is not None
-    response, model = path.response, part.structure.build_model(point)
+    response, model = path.response, term.structure.build_model(point)
     quiet = np.diag(1.0 / np.diag(path.inverse[0]))
     spread, state = quiet.copy(), np.zeros((len(quiet), columns.shape[1]))
     products = np.zeros((columns.shape[1], columns.shape[1]))
@@ -175,72 +175,72 @@ def _filtered(part: ShiftTerm, point: ParameterVector, columns: FloatArray) -> F
 
 @pytest.mark.parametrize("every", [10, 20])
 def test_slow_samples_weigh_as_a_kalman_filter_weighs_them(every: int) -> None:
-    part, point = _sparse(every)
-    found = part.linearise(point)
+    term, point = _sparse(every)
+    found = term.linearise(point)
     assert found is not None
     slopes = found[1] / np.linalg.norm(found[1], axis=0)
-    expected = np.diag(_filtered(part, point, slopes))
-    weighed = np.einsum("ni,ni->i", slopes, part.weighting.apply_inverse(slopes))
+    expected = np.diag(_filtered(term, point, slopes))
+    weighed = np.einsum("ni,ni->i", slopes, term.weighting.apply_inverse(slopes))
     assert np.allclose(weighed, expected, rtol=1e-2, atol=0.0)
 
 
 def test_without_input_noise_the_sensors_weigh_alone() -> None:
-    part, _ = _short()
-    residual = np.ones(part.record.size)
+    term, _ = _short()
+    residual = np.ones(term.record.size)
     assert np.allclose(
-        build_sensor_whitener(part.record.sigma).apply_inverse(residual), part.record.sigma**-2
+        build_sensor_whitener(term.record.sigma).apply_inverse(residual), term.record.sigma**-2
     )
-    assert not np.any(build_sensor_whitener(part.record.sigma).estimate_input_part(residual))
+    assert not np.any(build_sensor_whitener(term.record.sigma).estimate_input_share(residual))
 
 
 def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> None:
-    part, point = _short()
-    speeds = tuple(one for one in part.record.outputs if one.name.endswith("speed"))
-    silent = {**part.record.input_sigma, TORQUE: 0.0}
-    record = replace(part.record, outputs=speeds, input_sigma=silent)
-    weighted = ShiftTerm.from_sensor_noise(part.structure, record).update_weighting(point)
+    term, point = _short()
+    speeds = tuple(one for one in term.record.outputs if one.name.endswith("speed"))
+    silent = {**term.record.input_sigma, TORQUE: 0.0}
+    record = replace(term.record, outputs=speeds, input_sigma=silent)
+    weighted = ShiftTerm.from_sensor_noise(term.structure, record).update_weighting(point)
     assert weighted.weighting.path is not None
 
 
 def test_expected_inputs_move_back_towards_the_truth() -> None:
     found = fitted(0)
-    part = found.problem.parts[0]
-    run = part.simulate(found.point)
+    term = found.problem.terms[0]
+    run = term.simulate(found.point)
     assert run is not None
     measured, _ = problem(bench())
-    record, exact = measured.parts[0].record, bench(noise=0.0).signals.pressures["B3"]
+    record, exact = measured.terms[0].record, bench(noise=0.0).signals.pressures["B3"]
     shift = bench().signals.shift
     inside = (exact.time > shift.inertia_phase[0] + 0.02) & (exact.time < shift.lockup_time - 0.02)
     errors = [
         np.convolve(
             (one.pressures["B3"].values - exact.values)[inside], np.ones(10) / 10.0, "valid"
         )
-        for one in (record, part.record)
+        for one in (record, term.record)
     ]
     assert np.std(errors[1]) < 0.8 * np.std(errors[0])
 
 
 def test_what_is_held_back_acts_on_the_residual_as_on_a_run() -> None:
     posed, truth = problem(bench())
-    part = posed.cut([bench().signals.shift.lockup_time - 0.02]).parts[0]
-    small = {name: 0.05 * values for name, values in part.record.held_back.items()}
+    term = posed.cut([bench().signals.shift.lockup_time - 0.02]).terms[0]
+    small = {name: 0.05 * values for name, values in term.record.held_back.items()}
     whole = {
-        name: Signal(p.time, p.values + small[name]) for name, p in part.record.pressures.items()
+        name: Signal(p.time, p.values + small[name]) for name, p in term.record.pressures.items()
     }
-    smooth = replace(part, record=replace(part.record, held_back=small))
-    read = replace(part, record=replace(part.record, pressures=whole, held_back={}))
+    smooth = replace(term, record=replace(term.record, held_back=small))
+    read = replace(term, record=replace(term.record, pressures=whole, held_back={}))
     runs = smooth.simulate(truth), read.simulate(truth)
     assert runs[0] is not None
     assert runs[1] is not None
     before = smooth.compute_residual(runs[0])
-    expected = (read.compute_residual(runs[1]) - before) / part.record.sigma
-    found = (smooth.update_weighting(truth).compute_residual(runs[0]) - before) / part.record.sigma
+    expected = (read.compute_residual(runs[1]) - before) / term.record.sigma
+    found = (smooth.update_weighting(truth).compute_residual(runs[0]) - before) / term.record.sigma
     assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
 
 
 def test_expected_noise_of_samples_is_the_transpose_of_interpolation() -> None:
     rng = np.random.default_rng(1)
-    record = problem(bench())[0].parts[0].record
+    record = problem(bench())[0].terms[0].record
     steps = {
         name: rng.standard_normal(record.time.size - 1) for name in (TORQUE, *record.pressures)
     }

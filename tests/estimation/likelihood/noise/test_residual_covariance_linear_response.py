@@ -18,8 +18,8 @@ from tests.support.bench import record_bench
 @pytest.mark.parametrize("name", ["engine torque", "B3"])
 def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     posed, point = problem(bench(noise=0.0))
-    part = posed.parts[0]
-    base = part.simulate(point)
+    term = posed.terms[0]
+    base = term.simulate(point)
     assert base is not None
     shift = bench(noise=0.0).signals.shift
     size, start = (0.5, 3.0) if name == "engine torque" else (50.0, shift.inertia_phase[0] + 0.05)
@@ -29,24 +29,24 @@ def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         return size * np.asarray((time > start) & (time < start + 0.2), dtype=float)
 
-    inputs = {"engine torque": part.record.engine_torque} | dict(part.record.pressures)
+    inputs = {"engine torque": term.record.engine_torque} | dict(term.record.pressures)
     old = inputs[name]
     new = Signal(old.time, old.values + bump(old.time))
     if name == "engine torque":
-        record = replace(part.record, engine_torque=new)
+        record = replace(term.record, engine_torque=new)
     else:
-        record = replace(part.record, pressures={**part.record.pressures, name: new})
-    run = replace(part, record=record).simulate(point)
+        record = replace(term.record, pressures={**term.record.pressures, name: new})
+    run = replace(term, record=record).simulate(point)
     assert run is not None
     middle = 0.5 * (base.time[1:] + base.time[:-1])
     change = np.interp(middle, new.time, new.values - old.values)
-    expected = part.respond_to_inputs(point, base, {name: change})
-    found = part.record.sample_run(run) - part.record.sample_run(base)
+    expected = term.respond_to_inputs(point, base, {name: change})
+    found = term.record.sample_run(run) - term.record.sample_run(base)
     near_lock = np.abs(
-        np.concatenate([base.time[out.place] for out in part.record.outputs]) - shift.lockup_time
+        np.concatenate([base.time[out.place] for out in term.record.outputs]) - shift.lockup_time
     )
     clear = near_lock > 0.003
-    weight = clear / part.record.sigma
+    weight = clear / term.record.sigma
     miss = np.linalg.norm((found - expected) * weight) / np.linalg.norm(found * weight)
     assert miss < 0.03
 
@@ -59,12 +59,12 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: LossLaw
     scenario = replace(scenario, model=replace(scenario.model, loss_law=law))
     made = record_bench(scenario, 0, ROUGH, 0.0)
     posed, point = problem(made)
-    part, shift = posed.parts[0], made.signals.shift
-    base = part.simulate(point)
+    term, shift = posed.terms[0], made.signals.shift
+    base = term.simulate(point)
     assert base is not None
-    old, age = part.record.engine_torque, part.structure.get_value(point, "te_delay")
+    old, age = term.record.engine_torque, term.structure.get_value(point, "te_delay")
     middle = 0.5 * (base.time[1:] + base.time[:-1])
-    time = np.concatenate([base.time[out.place] for out in part.record.outputs])
+    time = np.concatenate([base.time[out.place] for out in term.record.outputs])
     clear = np.abs(time - shift.lockup_time) > 0.003
     spans = (
         (shift.torque_phase[0] - 0.6, 0.4),
@@ -73,13 +73,13 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: LossLaw
     )
     for start, length in spans:
         bump = 0.5 * ((old.time > start) & (old.time < start + length))
-        moved = replace(part.record, engine_torque=Signal(old.time, old.values + bump))
-        run = replace(part, record=moved).simulate(point)
+        moved = replace(term.record, engine_torque=Signal(old.time, old.values + bump))
+        run = replace(term, record=moved).simulate(point)
         assert run is not None
         change = np.interp(middle + age, old.time, bump)
-        expected = part.respond_to_inputs(point, base, {"engine torque": change})
-        found = part.record.sample_run(run) - part.record.sample_run(base)
-        weight = clear / part.record.sigma
+        expected = term.respond_to_inputs(point, base, {"engine torque": change})
+        found = term.record.sample_run(run) - term.record.sample_run(base)
+        weight = clear / term.record.sigma
         miss = np.linalg.norm((found - expected) * weight) / np.linalg.norm(found * weight)
         assert miss < 0.07
 
@@ -89,14 +89,14 @@ def test_no_slip_is_left_over_wherever_in_a_step_the_element_locks(level: float)
     posed, point = problem(bench(noise=0.0))
     values = point.values.copy()
     values[point.names.index("B3.mu_c")] *= level
-    point, part = point.replace_values(values), posed.parts[0]
-    run = part.simulate(point)
+    point, term = point.replace_values(values), posed.terms[0]
+    run = term.simulate(point)
     assert run is not None
     lock = next(event.time for event in run.events if event.kind == "lock")
-    model = part.structure.build_model(point)
+    model = term.structure.build_model(point)
     element = next(one for one in model.elements if one.name == "B3")
     disturbance = {"engine torque": np.ones(run.time.size - 1)}
-    z = part.compute_response(point, run).propagate_inputs(disturbance)
+    z = term.compute_response(point, run).propagate_inputs(disturbance)
     slip = z[:, 0] / element.i_c - element.i_out * z[:, 1]
     assert np.max(np.abs(slip)) > 1e-2
     assert np.max(np.abs(slip[run.time > lock])) < 1e-12

@@ -83,11 +83,11 @@ def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
 def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
     made = bench()
     posed, start = problem(made)
-    part = posed.parts[0]
-    fixed = {**part.structure.fixed, "i_f": 1.3 * part.structure.driveline.i_f}
-    wrong = replace(part, structure=replace(part.structure, fixed=fixed))
+    term = posed.terms[0]
+    fixed = {**term.structure.fixed, "i_f": 1.3 * term.structure.driveline.i_f}
+    wrong = replace(term, structure=replace(term.structure, fixed=fixed))
     with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
-        fit_multistart(replace(posed, parts=(wrong,)), start, [made.signals.shift])
+        fit_multistart(replace(posed, terms=(wrong,)), start, [made.signals.shift])
 
 
 def test_two_starts_that_lead_nowhere_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:

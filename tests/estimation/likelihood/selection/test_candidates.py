@@ -46,7 +46,7 @@ def _fit(deviations: tuple[float, float]) -> Any:
     rows = np.array([[2.0, 0, 0, 0], [0, 5, 3, 0], [0, 0, 10, 0], [0, 0, 4, 10]])
     point = ParameterVector(NAMES, np.array([500.0, 4000.0, *deviations]))
     loads = [SimpleNamespace(structure=SimpleNamespace(compute_load=lambda _: 500.0))]
-    problem = SimpleNamespace(parts=loads)
+    problem = SimpleNamespace(terms=loads)
     return cast("Any", SimpleNamespace(point=point, covariance=rows @ rows.T, problem=problem))
 
 
@@ -148,7 +148,7 @@ def _three(known: dict[str, PriorValue] | None = None) -> Any:
 
 def test_load_deviations_add_up_to_zero_about_the_load_of_the_log() -> None:
     problem, point = _three()
-    structures = [part.structure for part in problem.parts]
+    structures = [term.structure for term in problem.terms]
     assert [one.compute_load(point) for one in structures] == pytest.approx(LOADS)
     assert point["Tv_over_if"] == pytest.approx(np.mean(LOADS))
     for one in structures:

@@ -144,13 +144,13 @@ def test_a_weighting_with_more_room_that_leaves_less_is_no_better_kind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     posed, _, best = _without_torque()
-    parts = [
-        replace(part, weighting=Whitener(2.0 * part.record.sigma**2))
-        for part in posed.select_modes(SPEEDS).parts
+    terms = [
+        replace(term, weighting=Whitener(2.0 * term.record.sigma**2))
+        for term in posed.select_modes(SPEEDS).terms
     ]
     roomy = replace(
         best,
-        problem=replace(posed, parts=tuple(parts)),
+        problem=replace(posed, terms=tuple(terms)),
         normal=replace(best.normal, cost=0.5 * best.normal.cost),
         chi2=0.5 * best.chi2,
     )

@@ -62,7 +62,7 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
     fit, notes = _chosen(made)
     assert any(note.code is Code.LOAD_GROWS for note in notes)
-    speed = fit.problem.parts[0].structure.mean_speed
+    speed = fit.problem.terms[0].structure.mean_speed
     assert _deviation(fit, AERO, GROWTH) < 3.5
     assert _deviation(fit, "Tv_over_if", load.evaluate(speed) / base.model.i_f) < 3.5
     assert _deviation(fit, "J_vehicle", base.model.J_v) < 3.5
@@ -96,7 +96,7 @@ def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search
     names, truth = fit.point.names, truth_of(made)
     assert AERO not in names
     assert fit.mean.names == names
-    assert all(part.structure.get_value(fit.point, AERO) == 0.0 for part in fit.problem.parts)
+    assert all(term.structure.get_value(fit.point, AERO) == 0.0 for term in fit.problem.terms)
     again = fit_local(fit.problem, fit.point)
     assert again is not None
     std, expected = (np.sqrt(np.diag(one.covariance)) for one in (fit, again))

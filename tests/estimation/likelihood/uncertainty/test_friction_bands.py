@@ -16,16 +16,16 @@ from tests.estimation.likelihood.fixtures import fitted
 def test_a_curve_goes_over_the_slips_of_all_shifts_and_not_of_the_first_alone() -> None:
     """An element may let go in the first shift of a log, under little slip, and come on later."""
     fit = fitted()
-    (whole,) = fit.problem.parts
+    (whole,) = fit.problem.terms
     oncoming = whole.structure.driveline.oncoming.name
     run = whole.simulate(fit.point)
     assert run is not None
     lock = next(one.time for one in run.events if (one.kind, one.element) == ("lock", oncoming))
     brief = ShiftTerm.from_sensor_noise(whole.structure, whole.record.cut(lock - 0.15))
     alone = build_friction_curves(fit, {}, keep_fit(fit))[oncoming]
-    both = replace(fit, problem=replace(fit.problem, parts=(brief, whole)))
+    both = replace(fit, problem=replace(fit.problem, terms=(brief, whole)))
     joined = build_friction_curves(both, {}, keep_fit(fit))[oncoming]
     assert joined.slip[[0, -1]] == pytest.approx(alone.slip[[0, -1]])
-    short = replace(fit, problem=replace(fit.problem, parts=(brief,)))
+    short = replace(fit, problem=replace(fit.problem, terms=(brief,)))
     cut = build_friction_curves(short, {}, keep_fit(fit))[oncoming]
     assert cut.slip[0] > 10.0 * alone.slip[0]

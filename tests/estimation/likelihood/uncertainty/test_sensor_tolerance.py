@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ages of the sensors against what must hold of them, and against a fit of older signals."""
+"""Delays of the sensors against what must hold of them, and against a fit of older signals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 from tests.support.shared_results import shared
 
-AGE = 1e-3
+DELAY = 1e-3
 OTHERS = (
     "output_torque",
     "engine_speed",
@@ -34,9 +34,9 @@ OTHERS = (
 
 
 def shifts(*roles: str) -> FloatArray:
-    """Sum of the shifts of all unknowns by values of `roles` that are `AGE` older."""
-    found = compute_sensor_shifts(fitted(), {role: SensorTolerance(age=AGE) for role in roles})
-    assert set(found) <= {f"{role} age" for role in roles}
+    """Sum of the shifts of all unknowns by values of `roles` that are `DELAY` older."""
+    found = compute_sensor_shifts(fitted(), {role: SensorTolerance(delay=DELAY) for role in roles})
+    assert set(found) <= {f"{role} delay" for role in roles}
     return np.asarray(sum(found.values()))
 
 
@@ -48,7 +48,7 @@ def in_deviations(shift: FloatArray) -> dict[str, float]:
 def test_an_older_engine_torque_has_a_larger_age_and_changes_nothing_else() -> None:
     shift = shifts("engine_torque")
     names = fitted().point.names
-    assert shift[names.index("te_delay")] == pytest.approx(AGE, rel=0.02)
+    assert shift[names.index("te_delay")] == pytest.approx(DELAY, rel=0.02)
     others = {name: one for name, one in in_deviations(shift).items() if name != "te_delay"}
     assert max(map(abs, others.values())) < 0.3
 
@@ -57,14 +57,14 @@ def test_where_all_else_is_older_the_engine_torque_is_younger() -> None:
     """A time base that is moved moves no other parameter."""
     shift = shifts(*OTHERS)
     names = fitted().point.names
-    assert shift[names.index("te_delay")] == pytest.approx(-AGE, rel=0.05)
+    assert shift[names.index("te_delay")] == pytest.approx(-DELAY, rel=0.05)
     whole = {n: one for n, one in in_deviations(shift).items() if n in ("k_o", "c_o", "eta", "J_e")}
     assert max(map(abs, whole.values())) < 0.5
 
 
 def test_the_shift_is_that_of_a_fit_of_older_values() -> None:
     made = bench()
-    older = apply_sensor_error(made.signals, "output_torque", SensorTolerance(age=AGE))
+    older = apply_sensor_error(made.signals, "output_torque", SensorTolerance(delay=DELAY))
     posed, _ = problem(replace(made, signals=older))
     again = fit_multistart(posed, fitted().point, [older.shift])
     moved = in_deviations(again.point.values - fitted().point.values)

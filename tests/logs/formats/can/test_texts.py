@@ -44,7 +44,7 @@ FRAMES = "this is a table of raw bus frames"
         ("1320745424.000 CXX OVMS\n1320745424.002 R11 100 01 02\n", "this is a CRTD log of OVMS"),
         ("# Logger type: CL1000\n# HW rev: 1\nTimestamp;Type;ID;Data\n01T0,0;0;1a;00\n",
          "this is a text log of a CSS logger"),
-        ("t12320102\rt12320102\rt12320102\r", "raw frames in the form of slcan"),
+        ("t12320102\rt12320102\rt12320102\r", "raw frames in the format of slcan"),
         ("ASCII Trace IXXAT Automation GmbH\nDate: 1\n", "this is a trace of IXXAT"),
         ("Time Stamp,ID,Extended,LEN,D1,D2,D3,D4\n12,0x123,false,2,1,2,,\n", FRAMES),
         ("time,addr,bus,data\n0.1,291,0,0x0102\n", FRAMES),

@@ -296,16 +296,16 @@ def build_record(
     start = max(span[0], *(s.time[0] for s in inputs))
     end = min(span[1], *(s.time[-1] for s in inputs)) - RECORD.max_delay
     inside = {n: s.select_span((start, end)) for n, s in channels.items() if s is not None}
-    parts = {
+    found = {
         name: s for name, s in inside.items() if s.time.size and np.ptp(s.time) >= RECORD.min_output
     }
-    if missing := [name for name in ESSENTIAL if name not in parts]:
+    if missing := [name for name in ESSENTIAL if name not in found]:
         raise IdentificationError(
             f"{' and '.join(missing).replace('_', ' ')} hardly recorded between {start:.3f} s and "
             f"{end:.3f} s",
             "record engine and output speed throughout the shift",
         )
-    time = fill_grid(np.unique(np.concatenate([part.time for part in parts.values()])))
+    time = fill_grid(np.unique(np.concatenate([signal.time for signal in found.values()])))
     if time.size < 100:
         raise IdentificationError(
             f"only {time.size} samples between {start:.3f} s and {end:.3f} s to fit a model to",
@@ -314,11 +314,11 @@ def build_record(
     outputs = tuple(
         Output(
             name,
-            np.searchsorted(time, part.time),
-            part.values,
-            max(part.sigma, RECORD.min_noise * float(np.ptp(part.values))),
+            np.searchsorted(time, signal.time),
+            signal.values,
+            max(signal.sigma, RECORD.min_noise * float(np.ptp(signal.values))),
         ).drop_first_period(time)
-        for name, part in parts.items()
+        for name, signal in found.items()
     )
     torque, of_speeds = signals.engine_torque, signals.torque_of_speeds
     sigma = torque.sigma if of_speeds is None else float(np.sqrt(np.mean(of_speeds.rest**2)))

@@ -79,11 +79,11 @@ def compute_white_residuals(
     `residuals` (n,) of each shift replace those of the fit.
     """
     return {
-        part.label: {
-            out.name: (part.record.time[out.place], white)
-            for out, _, white in split_whitened(part, residual)
+        term.label: {
+            out.name: (term.record.time[out.place], white)
+            for out, _, white in split_whitened(term, residual)
         }
-        for part, residual in zip(fit.problem.parts, residuals or fit.normal.residuals, strict=True)
+        for term, residual in zip(fit.problem.terms, residuals or fit.normal.residuals, strict=True)
     }
 
 
@@ -93,9 +93,9 @@ def run_residual_tests(
     """Test every output by label of the shift; `residuals` as in `compute_white_residuals`."""
     found = {}
     whitened = compute_white_residuals(fit, residuals).values()
-    for part, outputs in zip(fit.problem.parts, whitened, strict=True):
-        found[part.label] = tuple(
-            _run_test(name, time, white, part.inputs) for name, (time, white) in outputs.items()
+    for term, outputs in zip(fit.problem.terms, whitened, strict=True):
+        found[term.label] = tuple(
+            _run_test(name, time, white, term.inputs) for name, (time, white) in outputs.items()
         )
     return found
 
@@ -164,8 +164,8 @@ def check_weighting(fit: Minimum, labels: Sequence[str]) -> list[Finding]:
     """
     return [
         report(Code.INPUT_NOISE_OMITTED, label)
-        for part, label in zip(fit.problem.parts, labels, strict=True)
-        if part.weighting.path is None
+        for term, label in zip(fit.problem.terms, labels, strict=True)
+        if term.weighting.path is None
     ]
 
 

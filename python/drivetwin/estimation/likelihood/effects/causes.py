@@ -107,7 +107,7 @@ class CauseSettings:
     """Cosine between the fitted effects of two causes, the unknowns adjusted, from which the log
     cannot tell them apart."""
     largest_power: float = 1.2
-    """Residual power per sample of the fit, a part of the plant included, above which no effect
+    """Residual power per sample of the fit, an added element included, above which no effect
     that is only a linear correction counts as certain: it would explain more than a fifth of the
     noise."""
 
@@ -153,7 +153,7 @@ def _is_explained(
     """Return whether a cause explains the log by a plausible `size` with its standard deviation.
 
     The residual with it is at the level of noise, and so is that of the fit but for a fifth: a
-    larger part would rest on the linear correction alone, to which many effects are alike. A size
+    larger share would rest on the linear correction alone, to which many effects are alike. A size
     within its interval of zero is none, however much evidence the amounts of other effects lend
     it; a size beyond its prior, or at a bound of the search, is that of another cause.
     """
@@ -162,15 +162,17 @@ def _is_explained(
     value, std = size
     if std is not None and abs(value) <= Z95 * std:
         return False
-    return not (group in find_large_groups(correction) or _is_part_implausible(fit, group.effect))
+    return not (group in find_large_groups(correction) or _is_plant_implausible(fit, group.effect))
 
 
-def _is_part_implausible(fit: LikelihoodFit, effect: EffectId | None) -> bool:
-    """Return whether an unknown of the part of the plant is at a bound of the search, or where its
+def _is_plant_implausible(fit: LikelihoodFit, effect: EffectId | None) -> bool:
+    """Return whether an unknown of the added element is at a bound of the search, or where its
     prior excludes it."""
     if fit.plant is None or fit.plant.effect is not effect:
         return False
-    own = slice(fit.plant.index, None)  # the unknowns of the part come last, its size first
+    own = slice(
+        fit.plant.index, None
+    )  # the unknowns of the added element come last, its size first
     below, above = locate_bounds(fit)
     prior = fit.problem.prior
     apart = np.abs(fit.point.values - prior.mean)[own] * np.sqrt(np.diag(prior.precision))[own]
@@ -180,7 +182,7 @@ def _is_part_implausible(fit: LikelihoodFit, effect: EffectId | None) -> bool:
 def _compute_cosine(one: GroupEvidence, other: GroupEvidence) -> float:
     """Compute the cosine between the fitted effects of two groups in the weighted samples.
 
-    A part of the plant has no columns; its own fit distinguishes it from all others.
+    An added element has no columns; its own fit distinguishes it from all others.
     """
     if not (one.columns and other.columns):
         return 0.0
@@ -192,8 +194,8 @@ def _compute_cosine(one: GroupEvidence, other: GroupEvidence) -> float:
 def _estimate_size(
     effect: Effect, correction: Correction, group: Group
 ) -> tuple[float, float | None]:
-    """Estimate the size of a cause with its standard deviation: beside all others, and of a part
-    of the plant alone."""
+    """Estimate the size of a cause with its standard deviation: beside all others; of an
+    added element alone."""
     step, columns = correction.step, correction.step.columns.find_columns(group)
     if not columns:
         own = correction.evidence[group]

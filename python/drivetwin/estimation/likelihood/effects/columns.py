@@ -35,7 +35,7 @@ def build_sensor_columns(
 ) -> Iterator[Disturbance]:
     """Build one column for each stated tolerance, its size one standard deviation.
 
-    The subject is `<role> gain`, `<role> offset` or `<role> age`; a sensor that the fit does not
+    The subject is `<role> gain`, `<role> offset` or `<role> delay`; a sensor that the fit does not
     use has none. An error of an output is that of the simulated signal: measured samples would
     carry their own noise into the score.
     """
@@ -53,26 +53,26 @@ def _build_column(at: OperatingPoint, role: str, kind: str, size: float) -> Dist
     subject = f"{role} {kind}"
     if output in (one.name for one in at.record.outputs):
         run, ones = get_columns(at.run)[output], np.ones(at.run.time.size)
-        changes = {"gain": run, "offset": ones, "age": -np.gradient(run, at.run.time)}
+        changes = {"gain": run, "offset": ones, "delay": -np.gradient(run, at.run.time)}
         return Disturbance(subject, outputs={output: size * changes[kind]})
     if source is None or source not in (TORQUE, *at.record.pressures):
         return None
     if source == TORQUE:
         values = at.engine_torque
-        delay = at.part.structure.get_value(at.point, "te_delay")
+        delay = at.term.structure.get_value(at.point, "te_delay")
         steady = at.record.steady_torque
         rate = at.compute_rate(np.interp(at.run.time + delay, steady.time, steady.values))
     else:
         signal = at.record.pressures[source]
         values = np.interp(at.middle, signal.time, signal.values)
         rate = at.compute_rate(np.interp(at.run.time, signal.time, signal.values))
-    change = {"gain": -values, "offset": -np.ones(at.middle.size), "age": rate}[kind]
+    change = {"gain": -values, "offset": -np.ones(at.middle.size), "delay": rate}[kind]
     return Disturbance(subject, inputs={source: size * change})
 
 
 CURVED_AMOUNTS = (0.05, 5.0)
 """Magnitudes of the amount, of the stated size, between which the column of a curved effect is
-formed."""
+computed."""
 
 
 CURVED_STEP = 0.05
@@ -158,7 +158,7 @@ class EffectColumns:
         return acting
 
     def follow(self, first: EffectColumns, acting: FloatArray) -> EffectColumns:
-        """Return the columns of `first` as formed anew, in its order and with its scale.
+        """Return the columns of `first` as recomputed, in its order and with its scale.
 
         `acting` (q,) are the amounts of `first` that drive the run already: their answer is taken
         out of the stated changes, so that the amounts are again the whole ones.
@@ -173,14 +173,14 @@ class EffectColumns:
         )
         return replace(found, known=known)
 
-    def form_again(self, amounts: FloatArray) -> FormedAgain:
+    def plan_second_step(self, amounts: FloatArray) -> Relinearization:
         """Describe the columns of a second step after `amounts` (q,) of these."""
         found = {
             group.effect: amount * scale
             for group, amount, scale in zip(self.groups, amounts, self.scale, strict=True)
             if group.effect is not None and EFFECTS[group.effect].curved and amount != 0.0
         }
-        return FormedAgain(
+        return Relinearization(
             set(self.groups), {one: _limit_amount(one, amount) for one, amount in found.items()}
         )
 
@@ -215,7 +215,7 @@ def build_columns(
     problem: ShiftObjective,
     point: ParameterVector,
     priors: EffectPriors,
-    again: FormedAgain | None = None,
+    again: Relinearization | None = None,
 ) -> EffectColumns | None:
     """Build the columns of all effects that are not off; None if a shift has no linear response.
 
@@ -223,11 +223,11 @@ def build_columns(
     A column that changes no compared sample is left out.
     """
     shifts: list[_ShiftColumns] = []
-    for part in problem.parts:
-        at = evaluate_operating_point(part, point)
+    for term in problem.terms:
+        at = evaluate_operating_point(term, point)
         if at is None:
             return None
-        shifts.append(_build_shift_columns(at, priors, again or FormedAgain()))
+        shifts.append(_build_shift_columns(at, priors, again or Relinearization()))
     keys = list(dict.fromkeys(key for one in shifts for key in one.keys))
     empty = np.ones(len(keys), dtype=bool)
     for one in shifts:
@@ -250,15 +250,15 @@ def build_columns(
 
 
 def _limit_amount(effect: EffectId, amount: float) -> float:
-    """Limit the amount at which the column of a curved effect is formed."""
+    """Limit the amount at which the column of a curved effect is computed."""
     size = float(np.clip(abs(amount), *CURVED_AMOUNTS))
     return -size if EFFECTS[effect].signed and amount < 0.0 else size
 
 
 @dataclass(frozen=True, eq=False)
-class FormedAgain:
+class Relinearization:
     """Columns of a further step: the `groups` of the first (None for all), and by curved effect the
-    amount at which its column is formed, of the stated size."""
+    amount at which its column is computed, of the stated size."""
 
     groups: Collection[Group] | None = None
     amounts: Mapping[EffectId, float] = field(default_factory=dict)
@@ -299,7 +299,7 @@ class _ShiftColumns:
 
 
 def _build_shift_columns(
-    at: OperatingPoint, priors: EffectPriors, again: FormedAgain
+    at: OperatingPoint, priors: EffectPriors, again: Relinearization
 ) -> _ShiftColumns:
     """Build the columns of one shift; those that are not finite are left out."""
     groups = again.groups
@@ -326,7 +326,7 @@ def _build_shift_columns(
             inputs.setdefault(name, nothing)[:, k] = values / amounts[k]
     keys = tuple(key for key, _ in named)
     stds = {
-        group: priors.get_prior(group.effect, at.part.structure.driveline).std
+        group: priors.get_prior(group.effect, at.term.structure.driveline).std
         for group, _ in keys
         if group.effect is not None
     }
@@ -351,19 +351,19 @@ def _build_curved(
 ) -> Disturbance:
     """Build the only disturbance of a curved effect at an `amount` of its stated size; one without
     action where a shift has none."""
-    std = priors.get_prior(effect, at.part.structure.driveline).std
+    std = priors.get_prior(effect, at.term.structure.driveline).std
     found = EFFECTS[effect].build(at, EFFECTS[effect].scale_amount(amount, std))
     return found[0] if found else Disturbance()
 
 
-def form_inputs(
+def compute_inputs(
     problem: ShiftObjective,
     point: ParameterVector,
     priors: EffectPriors,
     first: EffectColumns,
     amounts: FloatArray,
 ) -> list[dict[str, Signal]] | None:
-    """Form the changes of the inputs by name for `amounts` (q,) of the columns `first`, by shift.
+    """Compute the changes of inputs by name and shift for `amounts` (q,) of the columns `first`.
 
     A curved effect acts with its whole change at its amount. None where a run does not complete.
     """
@@ -375,8 +375,8 @@ def form_inputs(
     linear = amounts.copy()
     linear[list(curved.values())] = 0.0
     found = first.compute_inputs(linear)
-    for part, changes in zip(problem.parts, found, strict=True):
-        at = evaluate_operating_point(part, point) if curved else None
+    for term, changes in zip(problem.terms, found, strict=True):
+        at = evaluate_operating_point(term, point) if curved else None
         if curved and at is None:
             return None
         for effect, k in curved.items():
@@ -390,7 +390,7 @@ def form_inputs(
 
 
 def _get_amount(amounts: Mapping[EffectId, float], group: Group) -> float:
-    """Return the amount at which the columns of a group are formed, of the stated size."""
+    """Return the amount at which the columns of a group are computed, of the stated size."""
     return 1.0 if group.effect is None else amounts.get(group.effect, 1.0)
 
 
@@ -407,7 +407,7 @@ def _build_random(
     at: OperatingPoint, priors: EffectPriors, amounts: Mapping[EffectId, float]
 ) -> Iterator[tuple[Group, Disturbance]]:
     for name, effect in EFFECTS.items():
-        prior = priors.get_prior(name, at.part.structure.driveline)
+        prior = priors.get_prior(name, at.term.structure.driveline)
         if prior.std > 0.0 and not _is_in_plant(at, name):
             size = effect.scale_amount(amounts.get(name, 1.0), prior.std)
             for one in effect.build(at, size):
@@ -418,14 +418,14 @@ def _build_random(
 
 def _is_in_plant(at: OperatingPoint, effect: EffectId) -> bool:
     """Return whether the run itself has an effect, so that a column would count it twice."""
-    own = at.part.structure.plant_effect
+    own = at.term.structure.plant_effect
     return own is not None and own.effect is effect
 
 
 def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Disturbance, float]]:
     """Yield the disturbances of effects with a stated value, of that size."""
     for name, effect in EFFECTS.items():
-        value = priors.get_prior(name, at.part.structure.driveline).value
+        value = priors.get_prior(name, at.term.structure.driveline).value
         if value and not _is_in_plant(at, name):
             for one in effect.build(at, abs(value)):
                 yield one, float(np.sign(value))

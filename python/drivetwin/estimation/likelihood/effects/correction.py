@@ -14,7 +14,7 @@ from drivetwin.estimation.likelihood.effects.columns import (
     EffectColumns,
     EffectPriors,
     build_columns,
-    form_inputs,
+    compute_inputs,
 )
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import (
@@ -61,7 +61,7 @@ class CorrectionSettings:
     shortest_step: float = 0.1
     """Share of the first step below which the second is not tried."""
     largest_power: float = 10.0
-    """Largest residual power where columns are formed anew, over that of the fit and at least that
+    """Largest residual power where columns are recomputed, over that of the fit and at least that
     of noise: beyond it the columns are not those of the log's motion, and steps diverge."""
 
 
@@ -105,7 +105,7 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
 
     Effects with evidence move the values. The others have a posterior mean too; it is not applied,
     and the variance grows by its square. The first step is from the minimum of the fit. Where it
-    leaves the range in which the columns are linear, they are formed anew where it ends, and
+    leaves the range in which the columns are linear, they are recomputed where it ends, and
     another step is taken from there. A step holds the columns fixed while the unknowns move, so
     that steps may shrink slowly: they are extrapolated (Anderson, Journal of the ACM 12, 1965).
     """
@@ -140,8 +140,8 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
 def _describe_plant(
     fit: LikelihoodFit, plant: PlantEvidence, columns: int
 ) -> dict[Group, GroupEvidence]:
-    """Describe the part that the plant has as a group without columns; its amount is its size."""
-    own = fit.problem.parts[0].structure.plant_effect
+    """Describe the added element as a group without columns; its amount is its size."""
+    own = fit.problem.terms[0].structure.plant_effect
     assert own is not None, "the plant has an effect"
     first = fit.point.values[plant.index]
     size = own.get_size(float(first))
@@ -244,7 +244,7 @@ def _conclude(
     evidence: Mapping[Group, GroupEvidence],
     sizes: Mapping[Group, float],
 ) -> Correction:
-    """Form values and covariances at the last expansion."""
+    """Compute values and covariances at the last expansion."""
     step, chosen = base.take_step(), base.take_step(shown)
     size = last.size
     rest = step.moves - chosen.moves
@@ -265,7 +265,7 @@ def _conclude(
 def _expand_again(
     fit: LikelihoodFit, moves: FloatArray, priors: EffectPriors, amounts: _Amounts
 ) -> _Expansion | None:
-    """Form the columns anew at the end of the first step of `moves` (p,).
+    """Recompute the columns at the end of the first step of `moves` (p,).
 
     Where no run completes there, or the residual is beyond `largest_power`, the step is halved.
     """
@@ -293,16 +293,16 @@ def _expand_with_inputs(
     """
     first = amounts.columns
     acting = amounts.values * first.acts_on_inputs
-    changes = form_inputs(problem, point, priors, first, acting)
+    changes = compute_inputs(problem, point, priors, first, acting)
     if changes is None:
         return None
-    parts = [
-        part.add_to_inputs(point, one) for part, one in zip(problem.parts, changes, strict=True)
+    terms = [
+        term.add_to_inputs(point, one) for term, one in zip(problem.terms, changes, strict=True)
     ]
-    problem = replace(problem, parts=tuple(parts))
+    problem = replace(problem, terms=tuple(terms))
     normal = problem.normal(point)
-    formed = first.form_again(amounts.values)
-    columns = None if normal is None else build_columns(problem, point, priors, formed)
+    second = first.plan_second_step(amounts.values)
+    columns = None if normal is None else build_columns(problem, point, priors, second)
     if normal is None or columns is None:
         return None
     sums = weight_columns(problem, normal, columns.follow(first, acting))

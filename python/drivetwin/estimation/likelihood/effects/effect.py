@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Entry of an effect: meaning, prior size, columns of a fit, action in a synthetic log.
 
-Run and linear response of one shift about which the columns of effects are formed.
+Run and linear response of one shift about which the columns of effects are computed.
 
 Random walks less their means: Karhunen-Loève columns, and samples for synthetic logs.
 """
@@ -39,7 +39,7 @@ class OperatingPoint:
     on the grid it acts in time. `rows` are the points of the record's grid among those of the run.
     """
 
-    part: ShiftTerm
+    term: ShiftTerm
     point: ParameterVector
     model: DualClutch
     run: Trajectory
@@ -49,7 +49,7 @@ class OperatingPoint:
     @property
     def record(self) -> ShiftRecord:
         """Measured data of the shift."""
-        return self.part.record
+        return self.term.record
 
     @cached_property
     def middle(self) -> FloatArray:
@@ -80,12 +80,12 @@ class OperatingPoint:
     @cached_property
     def load(self) -> float:
         """Magnitude of the load at the output shaft [N m]."""
-        return abs(self.part.structure.compute_load(self.point))
+        return abs(self.term.structure.compute_load(self.point))
 
     @cached_property
     def engine_torque(self) -> FloatArray:
         """Acting engine torque (N-1,) over each step [N m]."""
-        signal = self.part.get_acting_torque(self.point)
+        signal = self.term.get_acting_torque(self.point)
         return np.interp(self.middle, signal.arrival, signal.values)
 
     @cached_property
@@ -93,14 +93,14 @@ class OperatingPoint:
         """Share (N-1,) of the torque that the on-coming element has taken over, from 0 to 1."""
         offgoing, oncoming = (
             np.abs(compute_middle(self.run.clutch_torque[one.name])) * one.a
-            for one in self.part.structure.elements
+            for one in self.term.structure.elements
         )
         share = oncoming / np.maximum(offgoing + oncoming, 1e-9)
         return np.asarray(np.maximum.accumulate(np.clip(share, 0.0, 1.0)))
 
     def describe_shift(self) -> str:
         """Return the shift in words: its number in the log."""
-        number = int(self.part.structure.label.removeprefix("start")) + 1
+        number = int(self.term.structure.label.removeprefix("start")) + 1
         return f"shift {number}"
 
     def compute_rate(self, column: FloatArray) -> FloatArray:
@@ -109,7 +109,7 @@ class OperatingPoint:
 
     def evaluate_contact(self, element: str) -> Contact:
         """Evaluate slip, pressure and friction of an element over each step."""
-        return evaluate_contact(self.part, self.point, self.run, element)
+        return evaluate_contact(self.term, self.point, self.run, element)
 
     def build_force(self, speed: int, torque: FloatArray) -> FloatArray:
         """Build forces (N-1, 4) of a torque (N-1,) [N m] on one of the speeds: 0 engine, 1
@@ -124,21 +124,21 @@ def compute_middle(column: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (column[1:] + column[:-1]))
 
 
-def evaluate_operating_point(part: ShiftTerm, point: ParameterVector) -> OperatingPoint | None:
+def evaluate_operating_point(term: ShiftTerm, point: ParameterVector) -> OperatingPoint | None:
     """Simulate a shift at `point` and linearise it; None if it has no complete, finite run."""
-    run = part.simulate(point)
+    run = term.simulate(point)
     if run is None:
         return None
-    grid, model = part.record.time, part.structure.build_model(point)
+    grid, model = term.record.time, term.structure.build_model(point)
     events = np.array([one.time for one in run.events if grid[0] < one.time < grid[-1]])
     if events.size:
         beside = np.min(np.abs(grid[:, None] - events), axis=0) > MIN_SPACING_S
         time = np.unique(np.concatenate([grid, events[beside]]))
-        run = part.simulate_on(point, time)
-    response = linearise_run(model, run, part.record)
+        run = term.simulate_on(point, time)
+    response = linearise_run(model, run, term.record)
     if run.status != "completed" or not response.finite:
         return None
-    return OperatingPoint(part, point, model, run, response, np.searchsorted(run.time, grid))
+    return OperatingPoint(term, point, model, run, response, np.searchsorted(run.time, grid))
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ class Effect:
     reason for it. `meaning` completes "the log shows ..."; `remedy` is advice where it is found.
     A `random` effect is a sample of a random process: no single value of it can be stated.
     The columns grow with the `power` of the size, of which the amount has the sign. A `curved`
-    effect is not proportional to that: a further step forms its column at the size found before,
+    effect is not proportional to that: a further step computes its column at the size found before,
     with the sign of that if the effect is `signed`.
     """
 

@@ -40,7 +40,7 @@ class EffectExpansion:
 
 
 def expand_effects(fit: LikelihoodFit, priors: EffectPriors) -> EffectExpansion | None:
-    """Form the columns of all effects at the minimum; None without a linear response."""
+    """Build the columns of all effects at the minimum; None without a linear response."""
     columns = build_columns(fit.problem, fit.point, priors)
     if columns is None:
         return None

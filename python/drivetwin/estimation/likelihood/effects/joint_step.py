@@ -148,7 +148,7 @@ class JointStep:
 def weight_columns(
     problem: ShiftObjective, normal: NormalEquations, columns: EffectColumns
 ) -> WeightedColumns:
-    """Form the weighted sums of `columns` at the point of the expansion `normal`."""
+    """Compute the weighted sums of `columns` at the point of the expansion `normal`."""
     score = compute_column_products(problem, normal, columns.matrices)
     pull, gradient = score.pull.copy(), normal.gradient.copy()
     for known, weighted, regressors in zip(
@@ -307,8 +307,8 @@ def take_joint_step(
         )
     )
     power = sum(
-        float(one @ part.weighting.apply_inverse(one))
-        for one, part in zip(residuals, problem.parts, strict=True)
+        float(one @ term.weighting.apply_inverse(one))
+        for one, term in zip(residuals, problem.terms, strict=True)
     )
     chi2 = max(power / problem.size, 1.0)
     corrected = replace(

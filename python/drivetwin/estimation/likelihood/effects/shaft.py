@@ -23,14 +23,14 @@ from drivetwin.estimation.likelihood.noise.shift_response import (
     compute_rates,
     iterate_jumps,
 )
-from drivetwin.simulation.dual_clutch import DualClutch
-from drivetwin.simulation.vehicle_parts import (
+from drivetwin.simulation.added_elements import (
     RIM_SHARE,
     InputShaft,
     ShaftTable,
     TyreSlip,
     compute_gap,
 )
+from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.vehicle.effects import EffectId
 
 _MODE_SHARE, _MODE_DAMPING = 0.5, 0.06
@@ -46,7 +46,7 @@ def build_input_shaft_mode(at: OperatingPoint, std: float) -> list[Disturbance]:
 def apply_input_shaft_mode(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
     """Put a shaft into J1."""
     front = InputShaft.from_mode(_MODE_SHARE * vehicle.model.J1, size, _MODE_DAMPING)
-    return replace(vehicle, parts=replace(vehicle.parts, front=front))
+    return replace(vehicle, added=replace(vehicle.added, front=front))
 
 
 INPUT_SHAFT_MODE = Effect(
@@ -93,7 +93,7 @@ def build_backlash(at: OperatingPoint, std: float) -> list[Disturbance]:
 def apply_backlash(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
     """Give the output shaft its play."""
     gap = compute_gap(size, vehicle.nominal.largest_shaft_torque, vehicle.model.k_o)
-    return replace(vehicle, parts=replace(vehicle.parts, gap=gap))
+    return replace(vehicle, added=replace(vehicle.added, gap=gap))
 
 
 BACKLASH = Effect(
@@ -120,7 +120,7 @@ def apply_progressive_shaft(vehicle: SyntheticVehicle, size: float) -> Synthetic
     """Replace the linear output shaft by a table."""
     full = vehicle.nominal.largest_shaft_torque
     table = ShaftTable.from_factor(vehicle.model.k_o, full, size)
-    return replace(vehicle, parts=replace(vehicle.parts, shaft_table=table))
+    return replace(vehicle, added=replace(vehicle.added, shaft_table=table))
 
 
 PROGRESSIVE_SHAFT = Effect(
@@ -233,7 +233,7 @@ def apply_tyre_slip(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
     """Put a tyre between the wheel and the vehicle."""
     torque = vehicle.nominal.largest_shaft_torque * vehicle.model.i_f
     tyre = TyreSlip.from_slip(torque, size, vehicle.model.J_v)
-    return replace(vehicle, parts=replace(vehicle.parts, tyre=tyre))
+    return replace(vehicle, added=replace(vehicle.added, tyre=tyre))
 
 
 TYRE_SLIP = Effect(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import integrate_trapezoids
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline import settle
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import (
@@ -20,7 +21,6 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Trajectory,
 )
-from drivetwin.simulation.vehicle_parts import NO_PARTS, VehicleParts
 
 _LEAST_SLIP = 1e-6
 """Slip [rad/s] above the round-off of a locked element."""
@@ -109,7 +109,7 @@ class SyntheticVehicle:
     """Vehicle of a scenario with the effects applied so far.
 
     `nominal` is the run without effects, `gears` are the shift elements in the order of the gears,
-    `seed` is that of the random effects. `model` and `parts` describe the vehicle, `engine_torque`
+    `seed` is that of the random effects. `model` and `added` describe the vehicle, `engine_torque`
     [N m] and `pressures` [Pa] act on it, `output_torque` is the error of its sensor. Friction
     depends on the work of the run `heated`, which has the times of the nominal one.
     """
@@ -121,7 +121,7 @@ class SyntheticVehicle:
     engine_torque: Signal
     pressures: Mapping[str, Signal]
     heated: Trajectory
-    parts: VehicleParts = NO_PARTS
+    added: AddedElements = NO_ADDED_ELEMENTS
     output_torque: TorqueError = TorqueError()
 
     @classmethod
@@ -164,6 +164,6 @@ class SyntheticVehicle:
 
     def build_task(self, start: State, time: FloatArray) -> DrivelineTask:
         """Build the run of `simulate`."""
-        settled = settle(self.model, self.parts, start, self.engine_torque, float(time[0]))
+        settled = settle(self.model, self.added, start, self.engine_torque, float(time[0]))
         given = (self.engine_torque, self.pressures, settled, time)
-        return DrivelineTask(self.model, self.parts, *given)
+        return DrivelineTask(self.model, self.added, *given)

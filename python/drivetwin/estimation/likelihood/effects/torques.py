@@ -40,7 +40,7 @@ def apply_slow_load(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
     nominal = vehicle.nominal
     walk = draw_walk(WalkStream.LOAD, vehicle.seed, float(nominal.trajectory.time[-1]))
     signal = Signal(walk.time, size * nominal.load * walk.values)
-    return replace(vehicle, parts=replace(vehicle.parts, walk=signal))
+    return replace(vehicle, added=replace(vehicle.added, walk=signal))
 
 
 SLOW_LOAD = Effect(
@@ -65,7 +65,7 @@ def build_aero_load(at: OperatingPoint, std: float) -> list[Disturbance]:
     if AERO in at.point.names:
         return []
     square = compute_middle(at.run.wheel_speed) ** 2
-    growth = square / max(at.part.structure.mean_speed**2, 1e-9) - 1.0
+    growth = square / max(at.term.structure.mean_speed**2, 1e-9) - 1.0
     torque = std * at.load * at.model.i_f * growth
     return [Disturbance(force=at.build_force(2, -torque))]
 
@@ -105,7 +105,7 @@ def build_brake_drag(at: OperatingPoint, std: float) -> list[Disturbance]:
 def apply_brake_drag(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
     """Add a constant drag torque to the wheel."""
     drag = size * abs(vehicle.nominal.load)
-    return replace(vehicle, parts=replace(vehicle.parts, brake_drag=drag))
+    return replace(vehicle, added=replace(vehicle.added, brake_drag=drag))
 
 
 BRAKE_DRAG = Effect(
@@ -126,7 +126,7 @@ def build_efficiency_by_gear(at: OperatingPoint, std: float) -> list[Disturbance
 
     The model's η is that of the gear that is left. The share of the on-coming element blends both.
     """
-    driveline = at.part.structure.driveline
+    driveline = at.term.structure.driveline
     torque = at.engine_torque - at.model.J1 * at.compute_rate(at.run.engine_speed)
     change = std * torque * at.oncoming_share / at.model.eta
     subject = f"{driveline.i_before:.4g} to {driveline.i_after:.4g}"
@@ -137,7 +137,7 @@ def apply_efficiency_by_gear(vehicle: SyntheticVehicle, size: float) -> Syntheti
     """Let the efficiency of each gear exceed that of the gear before by the size."""
     step = size / vehicle.model.eta
     efficiency = {name: 1.0 + k * step for k, name in enumerate(vehicle.gears) if k}
-    return replace(vehicle, parts=replace(vehicle.parts, efficiency=efficiency))
+    return replace(vehicle, added=replace(vehicle.added, efficiency=efficiency))
 
 
 EFFICIENCY_BY_GEAR = Effect(
@@ -165,7 +165,7 @@ def build_input_drag(at: OperatingPoint, std: float) -> list[Disturbance]:
 def apply_input_drag(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
     """Add a constant drag torque to the gearbox input."""
     drag = size * vehicle.nominal.largest_engine_torque
-    return replace(vehicle, parts=replace(vehicle.parts, input_drag=drag))
+    return replace(vehicle, added=replace(vehicle.added, input_drag=drag))
 
 
 INPUT_DRAG = Effect(
@@ -188,7 +188,7 @@ REFERENCE_TORQUE = 1500.0
 def build_drum_inertia(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Add the torque of an inertia that rotates with the slip of each element without a drum."""
     size = std * at.largest_engine_torque / REFERENCE_TORQUE
-    stated = {one.name for one in at.part.structure.driveline.drums}
+    stated = {one.name for one in at.term.structure.driveline.drums}
     found = []
     for one in at.model.elements:
         if one.name in stated:

@@ -225,12 +225,12 @@ class Whitener:
             first = self.path.seen.indices[::states].astype(np.uint32)
             samples = (rows, first, self.variance)
             return whiten(self.path.factor, samples, np.ascontiguousarray(each))
-        weighted = (each - self.estimate_input_part(each)) / self.variance[:, None]
+        weighted = (each - self.estimate_input_share(each)) / self.variance[:, None]
         if self.path is not None:
             weighted = self.path.apply_adjoint_feedback(weighted)
         return weighted.reshape(columns.shape)
 
-    def estimate_input_part(self, columns: FloatArray) -> FloatArray:
+    def estimate_input_share(self, columns: FloatArray) -> FloatArray:
         """Compute the part of residual columns (n,) or (n, q) that input noise explains best."""
         if self.path is None:
             return np.zeros_like(columns)

@@ -145,11 +145,11 @@ def compute_exponential(matrix: FloatArray, doublings: int) -> tuple[FloatArray,
 
     Taylor's series of M over 2^`doublings`, doubled so many times.
     """
-    part = matrix / 2.0**doublings
+    term = matrix / 2.0**doublings
     identity = np.eye(matrix.shape[-1])
-    result, mean, power = identity + part, identity + part / 2.0, part
+    result, mean, power = identity + term, identity + term / 2.0, term
     for order in (2, 3, 4):
-        power = power @ part / order
+        power = power @ term / order
         result = result + power
         mean = mean + power / (order + 1.0)
     for _ in range(doublings):

@@ -221,13 +221,13 @@ def _compute_mean_torque(signals: ShiftSignals, start: float) -> float:
 def _estimate_mode(signals: ShiftSignals, driveline: KnownDriveline) -> tuple[float, float]:
     """Estimate decay rate [1/s] and angular frequency [rad/s] of the twist rate after lock-up."""
     lockup = signals.shift.lockup_time
-    part = signals.output_speed.select_span(
+    motion = signals.output_speed.select_span(
         (lockup + GUESS.ringdown[0], lockup + GUESS.ringdown[1])
     )
-    time, twist_rate = part.time, part.values
+    time, twist_rate = motion.time, motion.values
     if signals.wheel_speed is not None:
-        twist_rate = part.values - driveline.i_f * signals.wheel_speed.interpolate_at_times(
-            part.time
+        twist_rate = motion.values - driveline.i_f * signals.wheel_speed.interpolate_at_times(
+            motion.time
         )
     try:
         time, twist_rate = drop_nan_rows(time, twist_rate)

@@ -86,7 +86,7 @@ class Basis:
 
     def get_prior(self, effect: EffectId) -> EffectPrior:
         """Return the prior of an effect."""
-        return self.priors.get_prior(effect, self.fit.problem.parts[0].structure.driveline)
+        return self.priors.get_prior(effect, self.fit.problem.terms[0].structure.driveline)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,7 @@ def try_minima(fit: LikelihoodFit, problem: ShiftObjective) -> LikelihoodFit:
 
 def try_plants(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """Try elements in the plant; `fit` is that of the dual clutch."""
-    if not fit.problem.parts[0].scale_known or fit.plant is not None:
+    if not fit.problem.terms[0].scale_known or fit.plant is not None:
         return fit
     with _STAGES.enter("expansion"):
         expansion = expand_effects(fit, priors)
@@ -252,7 +252,7 @@ def _search(
 def _propose_plant(effect: EffectId, basis: Basis) -> list[Callable[[], Refit | None]]:
     """Propose an element where its columns have enough evidence, or none of them could show it."""
     fit, prior = basis.fit, basis.get_prior(effect)
-    driveline = fit.problem.parts[0].structure.driveline
+    driveline = fit.problem.terms[0].structure.driveline
     if not (prior.std > 0.0 or prior.value):
         return []
     if not EFFECTS[effect].has_columns:
@@ -306,31 +306,31 @@ def _find_lingering(fit: LikelihoodFit) -> dict[str, float]:
     """Find the P0 of off-going elements that slip about it, by the name of the unknown, each with
     the noise of a sample of its pressure [Pa]."""
     found = {}
-    for part in fit.problem.parts:
-        leaving, _ = part.structure.elements
+    for term in fit.problem.terms:
+        leaving, _ = term.structure.elements
         name = f"{leaving.name}.P0"
-        if name in fit.point.names and _compute_time_about(part, fit.point, name) > _LINGERS:
-            found[name] = part.record.input_sigma[leaving.name]
+        if name in fit.point.names and _compute_time_about(term, fit.point, name) > _LINGERS:
+            found[name] = term.record.input_sigma[leaving.name]
     return found
 
 
-def _compute_time_about(part: ShiftTerm, point: ParameterVector, unknown: str) -> float:
+def _compute_time_about(term: ShiftTerm, point: ParameterVector, unknown: str) -> float:
     """Compute the time [s] for which an element slips at a pressure that noise may lift above the
     P0 `unknown` or not."""
-    run, name = part.simulate(point), unknown.removesuffix(".P0")
-    if run is None or name not in part.record.pressures:
+    run, name = term.simulate(point), unknown.removesuffix(".P0")
+    if run is None or name not in term.record.pressures:
         return 0.0
-    contact, signal = evaluate_contact(part, point, run, name), part.record.pressures[name]
-    P0 = part.structure.get_value(point, unknown)
+    contact, signal = evaluate_contact(term, point, run, name), term.record.pressures[name]
+    P0 = term.structure.get_value(point, unknown)
     away = np.abs(np.interp(contact.middle, signal.time, signal.values) - P0)
-    near = away < SMOOTHING.fill_sigma * part.record.input_sigma[name]
+    near = away < SMOOTHING.fill_sigma * term.record.input_sigma[name]
     return float(np.sum(np.diff(run.time)[near & (np.abs(contact.slip) > SLIPPING)]))
 
 
 def _compute_load_scale(fit: LikelihoodFit) -> float:
     """Compute the root mean square of the loads of the shifts [N m]: grade changes a load by about
     as much as it is."""
-    loads = [part.structure.compute_load(fit.point) for part in fit.problem.parts]
+    loads = [term.structure.compute_load(fit.point) for term in fit.problem.terms]
     return float(np.sqrt(np.mean(np.square(loads))))
 
 
@@ -355,7 +355,7 @@ CANDIDATES: Mapping[str, Candidate] = {
 
 def collect_loads(fit: LikelihoodFit) -> tuple[float, ...]:
     """Return the load of each shift at the output shaft [N m] where they differ; else empty."""
-    structures = [part.structure for part in fit.problem.parts]
+    structures = [term.structure for term in fit.problem.terms]
     if not any(one.load_factors for one in structures):
         return ()
     return tuple(one.compute_load(fit.mean) for one in structures)
@@ -374,12 +374,12 @@ def check_other_law(
     Others are those whose intervals under the two laws do not meet. `values` are the parameters by
     id, `slopes` (q, p) their derivatives by the unknowns, `std` (q,) their standard deviations.
     """
-    law = fit.problem.parts[0].structure.loss_law
+    law = fit.problem.terms[0].structure.loss_law
     other = [
-        replace(part, structure=replace(part.structure, loss_law=OTHER[law]))
-        for part in fit.problem.parts
+        replace(term, structure=replace(term.structure, loss_law=OTHER[law]))
+        for term in fit.problem.terms
     ]
-    normal = replace(fit.problem, parts=tuple(other)).normal(fit.point)
+    normal = replace(fit.problem, terms=tuple(other)).normal(fit.point)
     if normal is None:
         return []
     step = solve_step(normal.information, normal.gradient)

@@ -74,7 +74,7 @@ def fit_with_backlash(
 def _is_reversed(problem: ShiftObjective) -> bool:
     """Return whether the measured output torque goes to either side of zero, beyond the rounding
     of its sign."""
-    outputs = [out for part in problem.parts for out in part.record.outputs]
+    outputs = [out for term in problem.terms for out in term.record.outputs]
     torques = [out.values for out in outputs if out.name == OUTPUT_TORQUE]
     if not torques:
         return False

@@ -112,7 +112,7 @@ def extend_problem(
     priors: Sequence[PriorValue],
 ) -> tuple[ShiftObjective, ParameterVector]:
     """Add an effect to the plant; its unknowns come last, at the means of their `priors`."""
-    outputs = [out for part in problem.parts for out in part.record.outputs]
+    outputs = [out for term in problem.terms for out in term.record.outputs]
     full = max(float(np.max(np.abs(o.values))) for o in outputs if o.name == OUTPUT_TORQUE)
     own = PlantEffect(effect, full)
     values = np.append(point.values, [one.value for one in priors])

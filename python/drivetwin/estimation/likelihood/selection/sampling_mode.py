@@ -15,7 +15,7 @@ covariance C, the likelihood is
 
 where Q is the least over δ (Laplace's approximation; exact where the outputs are linear in δ, by
 |R + G·C·Gᵀ| = |R|·|1 + C·GᵀR⁻¹G|). G is that of the run at the minimum, so Σ depends on the mode
-through the unknowns that go with it: when elements slip, and at what pressures. An age of the
+through the unknowns that go with it: when elements slip, and at what pressures. A delay of the
 inputs moves these so far that log|Σ| differs by up to 40, mostly against the difference of Q: what
 gives pressure noise more room leaves less. It is no sure judge either: noise about P0 moves both
 terms by several. Other modes move P0 and friction so little that Q decides between them.
@@ -103,12 +103,12 @@ def _far_apart(problem: ShiftObjective) -> frozenset[str]:
     """The outputs of which half a period is nearly a delay of the inputs and too far away for an
     expansion: the speeds of a log without an output torque, and all outputs where they are slow.
 
-    That moves P0 and the age of the engine torque by many standard deviations.
+    That moves P0 and the delay of the engine torque by many standard deviations.
     """
-    if not problem.parts[0].scale_known:
+    if not problem.terms[0].scale_known:
         return frozenset(SPEEDS)
     periods = [
-        out.get_period(one.record.time) for one in problem.parts for out in one.record.outputs
+        out.get_period(one.record.time) for one in problem.terms for out in one.record.outputs
     ]
     return _shown(problem) if min(periods) > SLOW else frozenset()
 
@@ -126,7 +126,7 @@ def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodF
     """The fit with every signal of the likeliest mode.
 
     `problem` has signals as read, `best` is its fit with some modes. Without an output torque half
-    a period of all speeds is an age of the engine torque, too far away for an expansion to tell
+    a period of all speeds is a delay of the engine torque, too far away for an expansion to tell
     which it is: there the other mode of speeds is tried.
     """
 
@@ -146,7 +146,7 @@ def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodF
         known, best = best, better_of(best, promising, best.point)
         if best is known:
             break
-    if problem.parts[0].scale_known:
+    if problem.terms[0].scale_known:
         return best
     return better_of(best, best.problem.modes ^ frozenset(SPEEDS), _start_of_other_outputs(best))
 
@@ -155,7 +155,7 @@ def refit_slow_outputs(problem: ShiftObjective, best: LikelihoodFit) -> Likeliho
     """The fit, or where the outputs of a log with an output torque are slow that with all of them
     of the other mode, if it is likelier. `problem` has signals as read."""
     outputs = _far_apart(problem)
-    if not outputs or not problem.parts[0].scale_known:
+    if not outputs or not problem.terms[0].scale_known:
         return best
     modes = best.problem.modes ^ outputs
     other = _nearby(problem.select_modes(modes), best, _start_of_other_outputs(best))
@@ -201,8 +201,8 @@ def average_modes(
     reached = np.where(choices.left < np.min(choices.left) + TIE, Z95**-2, 0.0)
     values = np.clip(best.point.values + step, best.problem.lower, best.problem.upper)
     covariance = best.covariance + apart.T @ (np.maximum(weight, reached)[:, None] * apart)
-    told = replace(best, mean=best.point.replace_values(values), covariance=covariance)
-    return told, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
+    averaged = replace(best, mean=best.point.replace_values(values), covariance=covariance)
+    return averaged, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
 
 
 def widen_over_modes(
@@ -234,8 +234,8 @@ def _start_of_other_outputs(best: LikelihoodFit) -> ParameterVector:
     """Build the initial point for the other sampling mode of the outputs: the minimum of `best`,
     with torque delays by which both modes give nearly the same samples."""
     values = best.point.values.copy()
-    ages = {part.structure.get_unknown("te_delay"): part.record for part in best.problem.parts}
-    for name, record in ages.items():
+    delays = {term.structure.get_unknown("te_delay"): term.record for term in best.problem.terms}
+    for name, record in delays.items():
         if name in best.point.names:
             speed = next(out for out in record.outputs if out.name in SPEEDS)
             half = 0.5 * speed.get_period(record.time)
@@ -336,7 +336,7 @@ def _price(problem: ShiftObjective, modes: frozenset[str]) -> float:
 
 def _shown(problem: ShiftObjective) -> frozenset[str]:
     """Names of the outputs that the log holds."""
-    return frozenset(out.name for part in problem.parts for out in part.record.outputs)
+    return frozenset(out.name for term in problem.terms for out in term.record.outputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,7 +365,7 @@ def _choices(
 
     With `effects` their amounts are further unknowns, of unit prior variance.
     """
-    changes = [_changes(part, point) for part in problem.parts]
+    changes = [_changes(term, point) for term in problem.terms]
     score = compute_column_products(problem, normal, changes)
     gradient, information, cross = normal.gradient, normal.information, score.cross
     if effects is not None:
@@ -382,12 +382,12 @@ def _choices(
     return _Choices(flips, before + followed + price, steps[:, : point.values.size])
 
 
-def _changes(part: ShiftTerm, point: ParameterVector) -> FloatArray:
+def _changes(term: ShiftTerm, point: ParameterVector) -> FloatArray:
     """Compute the change (n, m) of a run by the other mode of each of `SIGNALS`, one column
     each."""
-    run = part.simulate(point)
+    run = term.simulate(point)
     assert run is not None, "a fit can be simulated"
-    record = part.record
+    record = term.record
     columns, found, first = get_columns(run), np.zeros((record.size, len(SIGNALS))), 0
     for out in record.outputs:
         rows = slice(first, first + out.values.size)
@@ -395,9 +395,9 @@ def _changes(part: ShiftTerm, point: ParameterVector) -> FloatArray:
         column = columns[out.name]
         change = out.sample_other_mode(run.time, column) - out.sample(run.time, column)
         found[rows, SIGNALS.index(out.name)] = change
-    bend = record.interpolate_bend(part.structure.get_value(point, "te_delay"))
+    bend = record.interpolate_bend(term.structure.get_value(point, "te_delay"))
     sign = -1.0 if record.curved else 1.0
-    answer = part.respond_to_inputs(point, run, {TORQUE: sign * bend})
+    answer = term.respond_to_inputs(point, run, {TORQUE: sign * bend})
     if np.all(np.isfinite(answer)):  # an unstable run has no finite response
         found[:, -1] = answer
     return found

@@ -207,7 +207,7 @@ def _report_growth(best: LikelihoodFit) -> list[Finding]:
         return []
     k = best.point.names.index(AERO)
     std = float(np.sqrt(best.covariance[k, k]))
-    return [report_growth(best.point[AERO], std, best.problem.parts[0].structure.mean_speed)]
+    return [report_growth(best.point[AERO], std, best.problem.terms[0].structure.mean_speed)]
 
 
 def _drop_unknown(best: LikelihoodFit, narrower: ShiftObjective, name: str) -> LikelihoodFit:
@@ -218,9 +218,9 @@ def _drop_unknown(best: LikelihoodFit, narrower: ShiftObjective, name: str) -> L
     """
     k = best.point.names.index(name)
     point, normal = _drop_value(best.point, k), best.normal
-    parts = [
-        replace(part, structure=other.structure)
-        for part, other in zip(best.problem.parts, narrower.parts, strict=True)
+    terms = [
+        replace(term, structure=other.structure)
+        for term, other in zip(best.problem.terms, narrower.terms, strict=True)
     ]
     normal = replace(
         normal,
@@ -230,7 +230,7 @@ def _drop_unknown(best: LikelihoodFit, narrower: ShiftObjective, name: str) -> L
         regressors=tuple(np.delete(one, k, axis=1) for one in normal.regressors),
         slopes=tuple(np.delete(one, k, axis=1) for one in normal.slopes),
     )
-    problem = replace(narrower, parts=tuple(parts))
+    problem = replace(narrower, terms=tuple(terms))
     return replace(
         best,
         problem=problem,

@@ -47,7 +47,7 @@ def compute_parameters(
 
     `slips` are those [rad/s] at which μ·gain is reported, by element; without it none is.
     """
-    structures = [part.structure for part in problem.parts]
+    structures = [term.structure for term in problem.terms]
     first = structures[0]
     values = {"eta": first.get_value(point, "eta")}
     for structure, s in zip(structures, signals, strict=True):
@@ -72,7 +72,7 @@ def compute_parameters(
         values |= {
             name: point[name] for name in structure.driveline.ratio_priors if name in point.names
         }
-    values |= first.compute_part_values(point, first.build_model(point))
+    values |= first.compute_added_element_values(point, first.build_model(point))
     return values if signals[0].scale_known else _rename_over_eta(values)
 
 
@@ -88,9 +88,9 @@ def compute_laws(problem: ShiftObjective, point: ParameterVector) -> dict[str, f
     """Compute the coefficients of the friction laws of all elements, by `make_law_id`."""
     return {
         make_law_id(element.name, key): value
-        for part in problem.parts
-        for element in part.structure.elements
-        for key, value in zip(LAW, part.structure.get_law(point, element.name), strict=True)
+        for term in problem.terms
+        for element in term.structure.elements
+        for key, value in zip(LAW, term.structure.get_law(point, element.name), strict=True)
     }
 
 

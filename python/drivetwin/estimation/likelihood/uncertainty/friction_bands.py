@@ -53,7 +53,7 @@ def build_friction_curves(
         slopes = evaluate_stribeck(_get_law(fit, correction, name)[0], base.slip)[1]
         change, variance = _add_shapes(fit, correction, name, base.slip, slopes)
         found[name] = _set_band(curve, curve.mu + change, np.sqrt(variance))
-    for name, partner in fit.problem.parts[0].structure.partners.items():
+    for name, partner in fit.problem.terms[0].structure.partners.items():
         if partner in found:
             empty = np.empty(0)
             base = replace(found[partner], points_slip=empty, points_mu=empty)
@@ -68,7 +68,7 @@ def build_friction_curves(
 
 def _list_free_laws(fit: LikelihoodFit) -> list[str]:
     """List the elements whose friction law is free."""
-    every = (one.name for part in fit.problem.parts for one in part.structure.elements)
+    every = (one.name for term in fit.problem.terms for one in term.structure.elements)
     return [name for name in dict.fromkeys(every) if has_free_law(fit.point, name)]
 
 
@@ -77,7 +77,7 @@ def _find_base(fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], name: st
 
 
 def _get_gain(fit: LikelihoodFit, name: str) -> PriorValue:
-    return fit.problem.parts[0].structure.driveline.couplings[name].gain_prior
+    return fit.problem.terms[0].structure.driveline.couplings[name].gain_prior
 
 
 def _get_law(
@@ -86,9 +86,9 @@ def _get_law(
     """Return the coefficients `LAW` (4,) of an element and their derivatives (4, p) by the
     unknowns."""
     structure = next(
-        part.structure
-        for part in fit.problem.parts
-        if name in (one.name for one in part.structure.elements)
+        term.structure
+        for term in fit.problem.terms
+        if name in (one.name for one in term.structure.elements)
     )
     std = np.sqrt(np.diag(fit.covariance))
     rows = differentiate(
@@ -111,7 +111,7 @@ def _build_curve(
         stribeck=Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v),
         method=METHOD,
         stribeck_covariance=to_law @ covariance @ to_law.T,
-        over_eta=not fit.problem.parts[0].scale_known,
+        over_eta=not fit.problem.terms[0].scale_known,
     )
     return _set_band(curve, mu, np.sqrt(np.einsum("pn,pq,qn->n", slopes, covariance, slopes)))
 
@@ -133,8 +133,8 @@ def _add_shapes(
         return np.zeros(slip.size), np.einsum("pn,pq,qn->n", slopes, total, slopes)
     law = fit.point.values[index]
     largest = max(
-        float(np.max(find_loaded_slips(part, fit.point, name), initial=1.0))
-        for part in fit.problem.parts
+        float(np.max(find_loaded_slips(term, fit.point, name), initial=1.0))
+        for term in fit.problem.terms
     )
     scale = EFFECTS[EffectId.FRICTION_SHAPE].std * correction.step.columns.scale[columns]
     shapes = FrictionShapes(law, largest).evaluate(np.abs(slip)) * scale
@@ -151,7 +151,7 @@ def _add_shapes(
 def _build_empty_curve(fit: LikelihoodFit, name: str) -> FrictionCurve:
     """Build an empty curve over the slips at which the element transmits torque in a simulated
     shift."""
-    slip = np.concatenate([find_loaded_slips(part, fit.point, name) for part in fit.problem.parts])
+    slip = np.concatenate([find_loaded_slips(term, fit.point, name) for term in fit.problem.terms])
     grid = np.linspace(float(slip.min()), float(slip.max()), POINTS)
     nothing, empty = np.zeros(POINTS), np.empty(0)
     return FrictionCurve(grid, nothing, nothing, nothing, empty, empty, None, METHOD)

@@ -25,7 +25,7 @@ from drivetwin.vehicle.spec import SensorTolerance
 
 SIZE = 0.01
 """Gain error, and offset in shares of a sensor's largest reading."""
-AGE = 1e-3
+DELAY = 1e-3
 """How much older values are than their stamps [s]."""
 FRICTION = "mu."
 """Start of the id of μ of an element, at `slips` of the sensitivity."""
@@ -36,12 +36,12 @@ def compute_sensor_shifts(
 ) -> dict[str, FloatArray]:
     """Compute the shift (p,) of all unknowns by one standard deviation of each sensor error.
 
-    Keys are `<role> gain`, `<role> offset` and `<role> age`; a sensor that the fit does not use has
-    none.
+    Keys are `<role> gain`, `<role> offset` and `<role> delay`; a sensor that the fit does not use
+    has none.
     """
     pulls: dict[str, FloatArray] = {}
-    for part, regressors in zip(fit.problem.parts, fit.normal.regressors, strict=True):
-        at = evaluate_operating_point(part, fit.point)
+    for term, regressors in zip(fit.problem.terms, fit.normal.regressors, strict=True):
+        at = evaluate_operating_point(term, fit.point)
         errors = [] if at is None else list(build_sensor_columns(at, tolerances))
         if at is None or not errors:
             continue
@@ -57,8 +57,8 @@ class Sensitivity:
     """Change of each result by each sensor error, SI.
 
     `ids` (q,) are parameter ids and `mu.<element>`, `values` (q,) their values; `errors` (e,) read
-    `<role> gain`, `<role> offset` or `<role> age`, `sizes` (e,) say how large (SI but for a gain);
-    `change` is (q, e). `slips` [rad/s] by element are those at which μ is given.
+    `<role> gain`, `<role> offset` or `<role> delay`, `sizes` (e,) are in SI but for a
+    gain; `change` is (q, e). `slips` [rad/s] by element are those at which μ is given.
     """
 
     ids: tuple[str, ...]
@@ -77,7 +77,7 @@ def compute_sensitivity(
     To first order in the fit's unknowns; costs one linear response of the run per input and kind.
     """
     largest = _find_largest_readings(fit)
-    sizes = {role: SensorTolerance(SIZE, SIZE * value, AGE) for role, value in largest.items()}
+    sizes = {role: SensorTolerance(SIZE, SIZE * value, DELAY) for role, value in largest.items()}
     slips = {name: float(np.mean(curve.slip[[0, -1]])) for name, curve in friction.items()}
 
     def results(unknowns: FloatArray) -> dict[str, float]:
@@ -108,8 +108,8 @@ def _compute_friction(
     """Compute μ of each element at its slip."""
     laws = {
         element.name: element.friction
-        for part in fit.problem.parts
-        for element in part.structure.build_model(point).elements
+        for term in fit.problem.terms
+        for element in term.structure.build_model(point).elements
     }
     return {
         FRICTION + name: float(laws[name].evaluate(np.array([slip]))[0])
@@ -120,8 +120,8 @@ def _compute_friction(
 def _find_largest_readings(fit: LikelihoodFit) -> dict[str, float]:
     """Return the largest absolute reading by role over all shifts, SI."""
     found: dict[str, float] = {}
-    for part in fit.problem.parts:
-        record = part.record
+    for term in fit.problem.terms:
+        record = term.record
         readings = {"engine_torque": record.engine_torque.values}
         readings |= {make_pressure_role(name): one.values for name, one in record.pressures.items()}
         for out in record.outputs:

@@ -31,17 +31,17 @@ typedef struct {
     dt_real weight;
 } place;
 
-/* Place of the instant `age` before the newest sample. */
-static place find_place(const dt_line *line, dt_real age) {
+/* Place of the instant `delay` before the newest sample. */
+static place find_place(const dt_line *line, dt_real delay) {
     int at = line->newest;
-    for (int k = 1; k < DT_LINE && age > DT_C(0); ++k) {
+    for (int k = 1; k < DT_LINE && delay > DT_C(0); ++k) {
         const int before = at > 0 ? at - 1 : DT_LINE - 1;
         const dt_real span = line->interval[at];
-        if (age < span) {
-            const place between = {&line->sample[at], &line->sample[before], age / span};
+        if (delay < span) {
+            const place between = {&line->sample[at], &line->sample[before], delay / span};
             return between;
         }
-        age -= span;
+        delay -= span;
         at = before;
     }
     const place exact = {&line->sample[at], &line->sample[at], DT_C(0)};

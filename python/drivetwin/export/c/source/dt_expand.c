@@ -155,11 +155,11 @@ static dt_real relative_size(const dt_expansion *e, int k) {
     return size;
 }
 
-/* The part of `h` over which the terms of stiction up to `order` tell how large those after it are.
+/* The part of `h` over which the terms of stiction up to `order` bound those after it.
  * With q the swing of |slip| / v_s they are as q^k / k! times exp(-|slip| / v_s) at the start: where
  * that is tiny they may start below any tolerance and still rise, up to k = q. Only a swing at whose
  * end nothing is left of stiction may be larger. */
-static dt_real told_span(const dt_expansion *e, const dt_params *p, const dt_state *s, int order,
+static dt_real bounded_span(const dt_expansion *e, const dt_params *p, const dt_state *s, int order,
                          dt_real h) {
     dt_real part = DT_C(1);
     for (int j = 0; j < DT_CLUTCHES; ++j) {
@@ -193,7 +193,7 @@ dt_real dt_expand(dt_expansion *e, const dt_mechanism *m, const dt_params *p, co
         power *= h;
         before = recent;
         recent = relative_size(e, k + 1) * power;
-        if (dt_larger(before, recent) <= DT_TOLERANCE && told_span(e, p, s, k, h) >= h) {
+        if (dt_larger(before, recent) <= DT_TOLERANCE && bounded_span(e, p, s, k, h) >= h) {
             e->order = k + 1;
             break;
         }
@@ -203,5 +203,5 @@ dt_real dt_expand(dt_expansion *e, const dt_mechanism *m, const dt_params *p, co
     if (excess > DT_C(1)) {
         h *= dt_smaller(DT_C(0.8) * dt_pow(excess, DT_C(-1) / DT_C(DT_TERMS - 1)), DT_C(1));
     }
-    return told_span(e, p, s, e->order, h);
+    return bounded_span(e, p, s, e->order, h);
 }

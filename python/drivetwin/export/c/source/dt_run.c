@@ -5,7 +5,7 @@
  *
  * Input rows: time [s], engine torque [N m], pressure of the off-going and of the on-coming element
  * [Pa]; blank lines and those that start with a letter are skipped. Inputs are linear between rows,
- * or held. A failure is told on stderr: 1 to 5 are those of dt_status, 6 a row that cannot be
+ * or held. A failure is reported on stderr: 1 to 5 are those of dt_status, 6 a row that cannot be
  * read. */
 
 #include <ctype.h>

@@ -14,7 +14,7 @@ extern "C" {
 
 /** Parameters as identified; copy them to change them. */
 extern const dt_params dt_twin_params;
-/** Where a run starts unless told otherwise: steadily in the old gear. */
+/** Where a run starts unless set otherwise: steadily in the old gear. */
 extern const dt_start dt_twin_start;
 /** Delays of the inputs for dt_line_begin; zero where the model takes acting inputs. */
 extern const dt_delays dt_twin_delays;

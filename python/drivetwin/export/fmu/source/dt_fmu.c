@@ -36,7 +36,7 @@ static const char *const faults[] = {
     "completed",
     "a parameter is out of range",
     "a state or input is not a finite number in range",
-    "more events in one step than can be told apart",
+    "more events in one step than can be separated",
     "no friction mode fits",
     "the engine stands or turns backward, which the dissipative loss law does not cover"};
 

@@ -20,7 +20,7 @@ from drivetwin.logs.raw import Recording
 
 @contextmanager
 def open_bus_text(path: Path, options: ReadOptions) -> Iterator[Recording]:
-    """Open a bus log in text form.
+    """Open a bus log in text format.
 
     Raises FileFormatError, MissingExtraError, MissingChannelError.
     """

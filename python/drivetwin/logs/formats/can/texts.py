@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bus logs in text form, recognised by their first bytes; logs of tools without a reader.
+"""Bus logs in text format, recognised by their first bytes; logs of tools without a reader.
 
 Native logs of bus tools for which there is no reader are refused by name, with a way to convert.
 """
@@ -25,16 +25,16 @@ _TEXT_FORMATS: tuple[tuple[Callable[[bytes], bool], Callable[[bytes, str], Frame
     (is_candump, read_candump),
     (is_asc, read_asc),
 )
-"""Test of the first bytes, and reader, of each bus log in text form."""
+"""Test of the first bytes, and reader, of each bus log in text format."""
 
 
 def is_bus_text(head: bytes) -> bool:
-    """Return True if the first bytes of a file are a bus log in text form."""
+    """Return True if the first bytes of a file are a bus log in text format."""
     return any(fits(head) for fits, _ in _TEXT_FORMATS)
 
 
 def read_bus_text(data: bytes, file: str) -> Frames:
-    """Read the frames of a bus log in text form. Raises FileFormatError."""
+    """Read the frames of a bus log in text format. Raises FileFormatError."""
     return next(read for fits, read in _TEXT_FORMATS if fits(data[:HEAD_BYTES]))(data, file)
 
 
@@ -111,7 +111,7 @@ _TOOLS = (
     ),
     _Tool("a trace of IXXAT", _compile(rb"\A[^\n]*ASCII Trace IXXAT"), _BY_SAVVYCAN),
     _Tool(
-        "raw frames in the form of slcan",
+        "raw frames in the format of slcan",
         re.compile(
             rb"\A(?:t[0-9A-Fa-f]{3}[0-8][0-9A-Fa-f]*\r?\n?|T[0-9A-Fa-f]{8}[0-8][0-9A-Fa-f]*"
             rb"\r?\n?){3}"

@@ -55,7 +55,7 @@ class Port:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Component:
     """Element of a model; its ports are attributes, e.g. `gear.a`, `set.sun`, `engine.node`."""
 
     element: Element

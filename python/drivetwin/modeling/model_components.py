@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Parts, nodes and inputs of a model, and the rules by which an element is added."""
+"""Components, nodes and inputs of a model, and the rules by which an element is added."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
-from drivetwin.modeling.part import Node, Part, Port
+from drivetwin.modeling.component import Component, Node, Port
 from drivetwin.simulation.element_schema import (
     ELEMENT_FIELDS,
     GROUND,
@@ -19,26 +19,26 @@ from drivetwin.simulation.element_schema import (
 )
 from drivetwin.simulation.network import Element, InputValue, build_element
 
-Place = Node | Port | Part | str
+Place = Node | Port | Component | str
 
 
-class ModelParts:
-    """Parts, nodes and inputs of a model."""
+class ModelComponents:
+    """Components, nodes and inputs of a model."""
 
     def __init__(self, name: str) -> None:
         self.name = name
         self.ground = Node(GROUND)
-        self.parts: list[Part] = []
+        self.components: list[Component] = []
         self.nodes: list[Node] = [self.ground]
         self.inputs: dict[str, InputValue] = {}
         self.faults: list[str] = []
         self._speeds: dict[Place, float] = {}
-        self._twists: dict[Part | str, float] = {}
-        self._locked: tuple[Part | str, ...] = ()
+        self._twists: dict[Component | str, float] = {}
+        self._locked: tuple[Component | str, ...] = ()
 
     def add_elements(
         self, elements: Sequence[Element], inputs: Mapping[str, InputValue] | None = None
-    ) -> dict[str, Part]:
+    ) -> dict[str, Component]:
         """Add elements that are described as mappings, e.g. those of a gearbox card.
 
         Returns them by name; their inputs go by the names in the description.
@@ -52,8 +52,8 @@ class ModelParts:
                 port: Port(name, port, self.node(node))
                 for port, node in list_ports(element).items()
             }
-            added[name] = Part(element, ports)
-        self.parts += added.values()
+            added[name] = Component(element, ports)
+        self.components += added.values()
         return added
 
     def node(self, name: str) -> Node:
@@ -64,7 +64,7 @@ class ModelParts:
         self.nodes.append(Node(name))
         return self.nodes[-1]
 
-    def _add(self, kind: str, name: str, **given: Any) -> Part:
+    def _add(self, kind: str, name: str, **given: Any) -> Component:
         """Add an element by places, values of inputs, and fields; None leaves a field out.
 
         A required port without a place gets its default, as the ground, or a node of its own.
@@ -81,9 +81,11 @@ class ModelParts:
             node = self.node(str(own)) if place is None else self._get_node(place)
             ports[port] = Port(name, port, node)
         nodes = {port: one.node.name for port, one in ports.items()}
-        part = Part(build_element(kind, name, **nodes, **self._fill(name, fields, given)), ports)
-        self.parts.append(part)
-        return part
+        component = Component(
+            build_element(kind, name, **nodes, **self._fill(name, fields, given)), ports
+        )
+        self.components.append(component)
+        return component
 
     def _fill(
         self, name: str, fields: Mapping[str, Field], given: Mapping[str, Any]
@@ -107,13 +109,13 @@ class ModelParts:
             return place.node
         if isinstance(place, Node):
             return place
-        if isinstance(place, Part) and len(place.ports) == 1:
+        if isinstance(place, Component) and len(place.ports) == 1:
             return next(iter(place.ports.values())).node
         self.faults.append(_describe_place(place))
         return self.node("?")
 
 
 def _describe_place(place: object) -> str:
-    if isinstance(place, Part):
+    if isinstance(place, Component):
         return f"{place.name} has several ports: name one of {', '.join(place.ports)}"
     return f"{place!r} is no node, port or element"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Parts that a vehicle may have beside the dual clutch, by their physical values and parameters.
+"""Elements that a vehicle may have beside the dual clutch, by their physical values and parameters.
 
 Among them the map of a torque converter.
 """
@@ -141,8 +141,8 @@ class ShaftTable:
 
 
 @dataclass(frozen=True, eq=False)
-class VehicleParts:
-    """Parts beside the dual clutch; None, empty or 0 where a part is absent.
+class AddedElements:
+    """Elements beside the dual clutch; None, empty or 0 where one is absent.
 
     `front` couples the engine to the gearbox. `input_drag` and `brake_drag` [N m] oppose the motion
     of gearbox input and wheel. `efficiency` is the efficiency of the gear of a shift element over
@@ -159,55 +159,57 @@ class VehicleParts:
     tyre: TyreSlip | None = None
     walk: Signal | None = None
 
-    def share_axes(self, other: VehicleParts) -> VehicleParts:
-        """Return the parts with tables over the axes of those of `other`."""
+    def share_axes(self, other: AddedElements) -> AddedElements:
+        """Return the elements with tables over the axes of those of `other`."""
         if self.shaft_table is None or other.shaft_table is None:
             return self
         return replace(self, shaft_table=self.shaft_table.resample(other.shaft_table.twist))
 
 
-NO_PARTS = VehicleParts()
+NO_ADDED_ELEMENTS = AddedElements()
 
 
 MODE_FREQUENCY, MODE_SHARE, MODE_DAMPING = "mode_frequency", "mode_share", "mode_damping"
 BACKLASH, TYRE_SLIP = "backlash", "tyre_slip"
 PROGRESSION, REFERENCE = "shaft_progression", "shaft_reference"
 """Parameter ids, see `drivetwin.parameters`."""
-PARTS: Mapping[str, tuple[str, ...]] = {
+ADDED_ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "an input shaft": (MODE_FREQUENCY, MODE_SHARE, MODE_DAMPING),
     "backlash in the output shaft": (BACKLASH,),
     "slip of the tyres": (TYRE_SLIP, REFERENCE),
     "a progressive output shaft": (PROGRESSION, REFERENCE),
 }
-"""Parameters of each part by its name, that of the size first."""
-PART_IDS = tuple(dict.fromkeys(name for ids in PARTS.values() for name in ids))
-"""All ids of parts, in reporting order."""
+"""Parameters of each element by its name, that of the size first."""
+ADDED_ELEMENT_IDS = tuple(dict.fromkeys(name for ids in ADDED_ELEMENTS.values() for name in ids))
+"""All ids of added elements, in reporting order."""
 
 
-def select_parts(values: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters by id of the parts all of whose parameters are in `values`."""
-    complete = [ids for ids in PARTS.values() if all(name in values for name in ids)]
-    return {name: values[name] for name in PART_IDS if any(name in ids for ids in complete)}
+def select_added_elements(values: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters by id of the elements all of whose parameters are in `values`."""
+    complete = [ids for ids in ADDED_ELEMENTS.values() if all(name in values for name in ids)]
+    return {
+        name: values[name] for name in ADDED_ELEMENT_IDS if any(name in ids for ids in complete)
+    }
 
 
-def build_parts(values: Mapping[str, float], model: DualClutch) -> VehicleParts:
-    """Build the parts that parameters describe.
+def build_added_elements(values: Mapping[str, float], model: DualClutch) -> AddedElements:
+    """Build the elements that parameters describe.
 
     Parameters
     ----------
     values
-        Parameters by id; ids of no part, and of parts that are incomplete, are ignored.
+        Parameters by id; ids of no added element, and of incomplete ones, are ignored.
     model
         Dual clutch of a shift.
 
     Returns
     -------
-    VehicleParts
-        `NO_PARTS` where the parameters describe none.
+    AddedElements
+        `NO_ADDED_ELEMENTS` where the parameters describe none.
     """
-    values = select_parts(values)
+    values = select_added_elements(values)
     if not values:
-        return NO_PARTS
+        return NO_ADDED_ELEMENTS
     front = tyre = table = None
     if MODE_FREQUENCY in values:
         inertia = values[MODE_SHARE] * model.J1
@@ -216,7 +218,7 @@ def build_parts(values: Mapping[str, float], model: DualClutch) -> VehicleParts:
         tyre = TyreSlip.from_slip(values[REFERENCE] * model.i_f, values[TYRE_SLIP], model.J_v)
     if PROGRESSION in values:
         table = ShaftTable.from_factor(model.k_o, values[REFERENCE], values[PROGRESSION])
-    return VehicleParts(
+    return AddedElements(
         front=front,
         gap=values.get(BACKLASH, 0.0),
         shaft_table=table,
@@ -224,6 +226,6 @@ def build_parts(values: Mapping[str, float], model: DualClutch) -> VehicleParts:
     )
 
 
-def describe_parts(values: Mapping[str, float]) -> str:
-    """Describe the parts that parameters by id describe, in words."""
-    return " and ".join(name for name, (size, *_) in PARTS.items() if size in values)
+def describe_added_elements(values: Mapping[str, float]) -> str:
+    """Describe in words the elements that parameters by id describe."""
+    return " and ".join(name for name, (size, *_) in ADDED_ELEMENTS.items() if size in values)
