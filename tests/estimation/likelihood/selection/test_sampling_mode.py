@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is told of the unknowns where a log hardly tells what kind of signals it holds."""
+"""Averages over sampling modes where a log hardly determines them."""
 
 from __future__ import annotations
 
@@ -45,36 +45,36 @@ def _posed() -> ShiftObjective:
 
 
 @shared
-def _fit(kinds: frozenset[str]) -> LikelihoodFit:
+def _fit(modes: frozenset[str]) -> LikelihoodFit:
     _, start = problem(record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH))
-    found = fit_local(_posed().select_modes(kinds), start)
+    found = fit_local(_posed().select_modes(modes), start)
     assert found is not None
     return found
 
 
-def _age(fit: LikelihoodFit) -> tuple[float, float]:
-    """The age told and its standard deviation [s]."""
+def _get_delay(fit: LikelihoodFit) -> tuple[float, float]:
+    """The estimated delay and its standard deviation [s]."""
     k = fit.point.names.index("te_delay")
     return fit.mean["te_delay"], float(np.sqrt(fit.covariance[k, k]))
 
 
-def test_two_kinds_that_the_log_hardly_tells_are_both_within_the_interval() -> None:
-    ages = [_fit(kinds).point["te_delay"] for kinds in (frozenset[str](), MEANS)]
-    sharp = _age(_fit(MEANS))[1]
-    assert abs(ages[0] - ages[1]) > 5.0 * sharp
-    told, doubts = average_modes(_posed(), _fit(MEANS))
-    value, std = _age(told)
-    assert all(abs(age - value) < 1.96 * std for age in ages)
+def test_two_modes_that_the_log_hardly_tells_are_both_within_the_interval() -> None:
+    delays = [_fit(modes).point["te_delay"] for modes in (frozenset[str](), MEANS)]
+    sharp = _get_delay(_fit(MEANS))[1]
+    assert abs(delays[0] - delays[1]) > 5.0 * sharp
+    averaged, doubts = average_modes(_posed(), _fit(MEANS))
+    value, std = _get_delay(averaged)
+    assert all(abs(delay - value) < 1.96 * std for delay in delays)
     truth = record_bench(load_scenario("throttle_steps"), UNDECIDED, ROUGH).truth["te_delay"]
     assert abs(truth - value) < 1.96 * std
     assert len(doubts) == 1
     assert doubts[0].names["channels"] == "output torque"
 
 
-def test_it_does_not_matter_from_which_kind_one_comes() -> None:
+def test_it_does_not_matter_from_which_mode_one_comes() -> None:
     one, other = (
-        _age(average_modes(_posed(), refit_best_mode(_posed(), _fit(kinds)))[0])
-        for kinds in (frozenset[str](), MEANS)
+        _get_delay(average_modes(_posed(), refit_best_mode(_posed(), _fit(modes)))[0])
+        for modes in (frozenset[str](), MEANS)
     )
     assert one[0] == pytest.approx(other[0], abs=0.1 * one[1])
     assert one[1] == pytest.approx(other[1], rel=0.1)
@@ -84,32 +84,32 @@ def test_a_clear_log_is_left_as_it_is() -> None:
     posed, start = problem(record_bench(load_scenario("paper_steps"), 0, ROUGH))
     fit = fit_local(posed, start)
     assert fit is not None
-    told, doubts = average_modes(posed, fit)
+    averaged, doubts = average_modes(posed, fit)
     std = np.sqrt(np.diag(fit.covariance))
     assert doubts == []
-    assert np.all(np.abs(told.mean.values - fit.point.values) < 1e-3 * std)
-    assert np.diag(told.covariance) == pytest.approx(np.diag(fit.covariance), rel=1e-3)
+    assert np.all(np.abs(averaged.mean.values - fit.point.values) < 1e-3 * std)
+    assert np.diag(averaged.covariance) == pytest.approx(np.diag(fit.covariance), rel=1e-3)
 
 
 def test_the_expansion_foretells_the_other_minimum() -> None:
     here, there = _fit(MEANS), _fit(frozenset[str]())
-    told, _ = average_modes(_posed(), here)
-    added = told.covariance - here.covariance
+    averaged, _ = average_modes(_posed(), here)
+    added = averaged.covariance - here.covariance
     k = here.point.names.index("te_delay")
     apart = there.point["te_delay"] - here.point["te_delay"]
-    share = (told.mean["te_delay"] - here.point["te_delay"]) / apart
+    share = (averaged.mean["te_delay"] - here.point["te_delay"]) / apart
     assert 0.0 < share < 1.0
     assert added[k, k] >= 0.99 * share * (1.0 - share) * apart**2
     assert np.all(np.linalg.eigvalsh(added) > -1e-9 * np.max(np.linalg.eigvalsh(added)))
 
 
-def test_what_another_search_alone_lowers_speaks_for_no_kind(
+def test_what_another_search_alone_lowers_speaks_for_no_mode(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     here, there = _fit(MEANS), _fit(frozenset[str]())
 
-    def told(fall: float) -> float:
-        """The age where every search after the first ends so much lower in Q."""
+    def average(fall: float) -> float:
+        """The delay where every search after the first ends so much lower in Q."""
         again = {
             one.problem.modes: replace(one, normal=replace(one.normal, cost=one.normal.cost - fall))
             for one in (here, there)
@@ -117,9 +117,9 @@ def test_what_another_search_alone_lowers_speaks_for_no_kind(
         monkeypatch.setattr(of_signals, "_nearby", lambda posed, *_: again.get(posed.modes))
         return average_modes(_posed(), here)[0].mean["te_delay"]
 
-    std = _age(here)[1]
-    assert abs(told(0.0) - here.point["te_delay"]) > 0.1 * std
-    assert told(8.0) == pytest.approx(told(0.0), abs=0.02 * std)
+    std = _get_delay(here)[1]
+    assert abs(average(0.0) - here.point["te_delay"]) > 0.1 * std
+    assert average(8.0) == pytest.approx(average(0.0), abs=0.02 * std)
 
 
 @shared
@@ -140,7 +140,7 @@ def _without_torque() -> tuple[ShiftObjective, ParameterVector, LikelihoodFit]:
     return posed, start, best
 
 
-def test_a_weighting_with_more_room_that_leaves_less_is_no_better_kind(
+def test_a_weighting_with_more_room_that_leaves_less_is_no_better_mode(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     posed, _, best = _without_torque()
@@ -159,7 +159,7 @@ def test_a_weighting_with_more_room_that_leaves_less_is_no_better_kind(
     assert refit_best_mode(posed, best) is best
 
 
-def test_kinds_are_compared_by_the_same_samples() -> None:
+def test_modes_are_compared_by_the_same_samples() -> None:
     assert _posed().select_modes(SPEEDS).size == _posed().size
 
 
@@ -179,7 +179,7 @@ def test_from_far_off_signals_are_taken_as_read() -> None:
     assert other.modes == frozenset(SPEEDS)
 
 
-def test_from_far_off_the_lower_gear_tells_kinds() -> None:
+def test_from_far_off_the_lower_gear_determines_modes() -> None:
     """Speeds that a bus sends as means over 10 ms, with pedal steps, from a poor start."""
     base = load_scenario("throttle_steps")
     sensors = [
@@ -193,7 +193,7 @@ def test_from_far_off_the_lower_gear_tells_kinds() -> None:
     assert frozenset(SPEEDS) <= likely.modes
 
 
-def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
+def test_without_an_output_torque_the_interval_reaches_the_other_mode_of_speeds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     posed, _, best = _without_torque()
@@ -203,13 +203,13 @@ def test_without_an_output_torque_the_interval_reaches_the_other_kind_of_speeds(
     assert other is not None
     far = abs(other.point["te_delay"] - best.point["te_delay"])
     assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
-    assert far < 1.96 * _age(wide)[1]
+    assert far < 1.96 * _get_delay(wide)[1]
     assert "engine speed" in doubts[0].text
     monkeypatch.setattr(of_signals, "EITHER_MODE", -np.inf)
     assert widen_over_modes(posed, best) == (best, [])
 
 
-def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
+def test_with_an_output_torque_the_speeds_show_of_what_mode_they_are() -> None:
     fit = _fit(MEANS)
     assert widen_over_modes(_posed(), fit) == (fit, [])
 
@@ -217,7 +217,7 @@ def test_with_an_output_torque_the_speeds_show_of_what_kind_they_are() -> None:
 @shared
 def _at_50_hertz(window: float) -> tuple[ShiftObjective, LikelihoodFit]:
     """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
-    the kinds that an expansion tells."""
+    the modes that an expansion tells."""
     base = load_scenario("throttle_steps")
     sensors = [
         replace(one, rate=50.0, window=window)
@@ -231,13 +231,13 @@ def _at_50_hertz(window: float) -> tuple[ShiftObjective, LikelihoodFit]:
     return posed, refit_best_mode(posed, fit)
 
 
-def test_slow_outputs_are_tried_as_the_other_kind_for_no_expansion_reaches_so_far() -> None:
+def test_slow_outputs_are_tried_as_the_other_mode_for_no_expansion_reaches_so_far() -> None:
     posed, known = _at_50_hertz(0.02)
     assert known.problem.modes == frozenset()
-    assert abs(_age(known)[0]) > 20.0 * _age(known)[1]  # half a period of the outputs
-    told = refit_slow_outputs(posed, known)
-    assert told.problem.modes == {*SPEEDS, "output_torque"}
-    assert abs(_age(told)[0]) < 2.0 * _age(told)[1]
+    assert abs(_get_delay(known)[0]) > 20.0 * _get_delay(known)[1]  # half a period of the outputs
+    averaged = refit_slow_outputs(posed, known)
+    assert averaged.problem.modes == {*SPEEDS, "output_torque"}
+    assert abs(_get_delay(averaged)[0]) < 2.0 * _get_delay(averaged)[1]
 
 
 def test_slow_samples_stay_samples() -> None:
@@ -246,5 +246,5 @@ def test_slow_samples_stay_samples() -> None:
     assert refit_slow_outputs(posed, known) is known
 
 
-def test_fast_outputs_of_the_other_kind_are_within_reach_of_the_expansion() -> None:
+def test_fast_outputs_of_the_other_mode_are_within_reach_of_the_expansion() -> None:
     assert refit_slow_outputs(_posed(), _fit(frozenset())) is _fit(frozenset())
