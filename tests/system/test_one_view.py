@@ -14,6 +14,7 @@ from drivetwin.drive import load_powertrain, plan_launch, run
 from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.gearbox import load_gearbox, reduce
+from drivetwin.logs.survey import Column
 from drivetwin.report.blocks import Block, Section, TableBlock
 from drivetwin.report.brief import build_identification_blocks
 from drivetwin.report.comparison import build_agreement_section, render_comparison
@@ -22,6 +23,7 @@ from drivetwin.report.find_reports import Candidate
 from drivetwin.report.fit import build_fit_blocks, render_fit
 from drivetwin.report.gearbox import build_reduction_blocks, evaluate_reduction
 from drivetwin.report.html import render_fragment, render_joint_report, render_page, render_report
+from drivetwin.report.sections.inputs import build_card_tables, build_column_table
 from drivetwin.report.text import format_blocks
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_fit
@@ -76,6 +78,22 @@ def reduce_gearbox() -> Shown:
         evaluate_reduction(reduce(load_gearbox("three-set-3000"), "2", "3"))
     )
     return blocks, render_page("A gearbox", "", [Section("shift", "2-3", "", blocks)])
+
+
+def inspect() -> Shown:
+    """The columns of a log."""
+    columns = [
+        Column("n_engine", "CAN 1", "rpm", 100.0, (600.0, 2200.0), 3, ("engine_speed",)),
+        Column("spare", "", None, None, None, 0, (), ignored=True),
+    ]
+    table = build_column_table(columns, "Columns")
+    return [table], render_page("A log", "", [Section("columns", "Columns", "", [table])])
+
+
+def show_card() -> Shown:
+    """A vehicle card."""
+    tables = build_card_tables(card())
+    return tables, render_page("A card", "", [Section("card", "Card", "", tables)])
 
 
 class Tables(HTMLParser):
@@ -141,7 +159,7 @@ def list_lines(row: Sequence[str]) -> Iterator[list[str]]:
         yield [word for cell in cells for word in "".join(cell[place : place + 1]).split()]
 
 
-SHOWN = (identify, identify_jointly, fit, drive, compare, reduce_gearbox)
+SHOWN = (identify, identify_jointly, fit, drive, compare, reduce_gearbox, inspect, show_card)
 
 
 @pytest.mark.parametrize("show", SHOWN, ids=lambda one: one.__name__)

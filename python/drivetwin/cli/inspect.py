@@ -23,7 +23,7 @@ from drivetwin.cli.output import (
 )
 from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
-from drivetwin.report.blocks import TableBlock, make_table
+from drivetwin.report.sections.inputs import build_column_table
 
 if TYPE_CHECKING:
     from drivetwin.channels.mapping import Mapped
@@ -239,21 +239,7 @@ def _select_shown(columns: Sequence[Column]) -> list[Column]:
 
 def _print_columns(columns: Sequence[Column], source: str) -> None:
     shown = _select_shown(columns)
-    print_blocks([_build_table(shown, source)])
+    print_blocks([build_column_table(shown, f"Columns of {source}")])
     if len(shown) < len(columns):
         more = len(columns) - len(shown)
         print_paragraph(f"{more} more columns, all without a role: --json lists them")
-
-
-def _build_table(columns: Sequence[Column], source: str) -> TableBlock:
-    rows = [
-        (
-            *(column.name, column.group, column.unit or "none", column.rate),
-            *(column.range or (None, None)),
-            column.gaps,
-            ", ".join(column.roles) or ("ignored" if column.ignored else "–"),
-        )
-        for column in columns
-    ]
-    numbers = (("Hz", ".4g"), ("min", ".4g"), ("max", ".4g"), ("gaps", "d"))
-    return make_table(f"Columns of {source}", ("column", "group", "unit", *numbers, "role"), rows)

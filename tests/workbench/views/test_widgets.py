@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import errno
 from dataclasses import replace
-from typing import Any
 
 import pytest
-from dash import html, no_update
+from dash import no_update
 
 from drivetwin.errors import RefusedError
 from drivetwin.workbench.session import Session
@@ -74,10 +73,3 @@ def test_a_fault_of_the_mapping_speaks_of_the_page(
     assert messages == [
         "The log cannot be read as mapped. no channel -> correct it in the step Channels"
     ]
-
-
-def test_the_head_of_a_column_of_numbers_stands_above_them() -> None:
-    rows = [("B2", html.Div("1.2", className="number")), ("B3", html.Div("–", className="number"))]
-    table: Any = widgets.make_table(("element", "P0 [bar]"), rows)
-    heads = table.children.children[0].children.children
-    assert [one.className for one in heads] == ["text", "number"]

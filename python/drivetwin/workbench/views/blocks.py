@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import repeat
 from typing import Any
 
 from dash import html
@@ -70,22 +71,25 @@ def _render_tile(tile: Tile) -> Component:
 
 
 def render_table(
-    block: TableBlock, controls: tuple[str, Sequence[Component | str]] = ("", ()), name: str = ""
+    block: TableBlock,
+    heads: Sequence[str] = (),
+    controls: Sequence[Sequence[Component | str]] = (),
+    name: str = "",
 ) -> Component:
-    """Render a table of the class `name`; `controls` are head and rows of a further last column."""
-    title, parts = controls
+    """Render a table of the class `name`; `controls` are the rows of more columns under `heads`."""
     body = [
         html.Tr(
             [
                 _render_cell(row[0], html.Th, scope="row"),
                 *(_render_cell(one, html.Td) for one in row[1:]),
-                *([html.Td(parts[place])] if parts else []),
+                *map(html.Td, own),
             ]
         )
-        for place, row in enumerate(block.rows)
+        for row, own in zip(block.rows, controls or repeat(()), strict=bool(controls))
     ]
-    heads = [*block.head, *([Cell(title)] if parts else [])]
-    top = html.Tr([_render_cell(one, html.Th, scope="col") for one in heads])
+    top = html.Tr(
+        [_render_cell(one, html.Th, scope="col") for one in (*block.head, *map(Cell, heads))]
+    )
     caption = [html.Caption(block.caption)] if block.caption else []
     table = html.Table([*caption, html.Thead(top), html.Tbody(body)])
     return html.Div(table, className=f"table {name}".strip())

@@ -11,13 +11,14 @@ from dash import Input, Output, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.findings import render
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.report.sections.inputs import build_card_tables
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import card_form
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.sources import (
     build_file_buttons,
     format_source,
@@ -103,35 +104,8 @@ def _build_content(opened: Opened) -> list[Component]:
     if opened.card is None:
         return []
     doubts = map(replace_options, render(opened.doubts))
+    tables = [render_table(one) for one in build_card_tables(opened.card)]
     return [
         ui.make_notes("Implausible on this card", doubts),
-        *_build_tables(opened.card),
-    ]
-
-
-def _build_tables(card: VehicleCard) -> list[Component]:
-    gears = [
-        (gear.name, f"{gear.ratio.value:.4g}", ", ".join(gear.elements)) for gear in card.gears
-    ]
-    elements = [
-        (name, spec.kind, f"{spec.P0.value * 1e-5:.3g} bar", f"{spec.gain.value:.4g} m³")
-        for name, spec in card.elements.items()
-    ]
-    low, high = card.J_prime_range
-    least, most = card.J_vehicle_range
-    facts = [
-        ("Final drive", f"{card.final_drive.value:.4g}"),
-        ("Inertia at the engine J′", f"{low:.3g} to {high:.3g} kg·m²"),
-        ("Inertia of the vehicle J3", f"{least:.4g} to {most:.4g} kg·m²"),
-        ("Sensor tolerances", ", ".join(card.sensors) or "none: intervals cover noise only"),
-    ]
-    return [
-        html.Div(
-            [
-                ui.make_table(("gear", "ratio", "elements"), gears, "Gears"),
-                ui.make_table(("element", "kind", "P0", "gain"), elements, "Shift elements"),
-                ui.make_table(("quantity", "value"), facts, f"{card.name}"),
-            ],
-            className="columns",
-        )
+        html.Div(tables, className="columns"),
     ]

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
@@ -16,6 +16,7 @@ from drivetwin.logs.survey import Column
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.recording import build_log_panels, plot_log
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.sections.inputs import build_column_table
 from drivetwin.report.style import MEASURED
 from drivetwin.workbench.exports import Record
 from drivetwin.workbench.mapping import Entry, Row, list_roles, list_rows, list_unit_names
@@ -24,6 +25,7 @@ from drivetwin.workbench.sandboxed_parse import Opened, Preview
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import Index
 from drivetwin.workbench.views.log_choice import Place, build_log_choice
 
@@ -110,15 +112,15 @@ def register(page: ui.Page) -> None:
 def _build_content(opened: Opened) -> list[Component]:
     roles = {"": "not used", **{role: role for role in list_roles(opened.survey)}}
     listed = list_rows(opened.survey)
-    rows = [_build_row(number, one, roles) for number, one in enumerate(listed)]
+    controls = [_build_controls(number, one, roles) for number, one in enumerate(listed)]
+    table = build_column_table(opened.survey.columns, with_roles=False)
     proposed = [_PROPOSED] if any(one.proposed for one in listed) else []
-    head = ("column", "unit in the file", "Hz", "min", "max", "gaps", "role", "unit", "sign")
     return [
         ui.make_notes(
             "The log cannot be read as mapped", filter(None, [replace_options(opened.fault)])
         ),
         ui.make_notes("About the columns", [*proposed, *map(replace_options, opened.survey.notes)]),
-        ui.make_table(head, rows, name="mapping"),
+        render_table(table, ("role", "unit", "sign"), controls, "mapping"),
         _build_time_unit(opened),
         ui.make_row(
             ui.make_button("Apply the mapping", "apply-mapping", main=True),
@@ -195,21 +197,14 @@ def _name_column(column: Column) -> str:
     return f"{column.name} ({column.group})" if column.group else column.name
 
 
-def _build_row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
-    column = one.column
-    low, high = column.range or (None, None)
-    name = _name_column(column)
+def _build_controls(number: int, one: Row, roles: dict[str, str]) -> list[Component]:
+    """Build the controls of a column: role, unit and sign."""
+    name = _name_column(one.column)
 
     def part(of: str) -> dict[str, str | int]:
         return {"part": of, "column": number}
 
     return [
-        name,
-        column.unit or "none",
-        _render_number(column.rate),
-        _render_number(low),
-        _render_number(high),
-        str(column.gaps) if column.gaps else "–",
         ui.make_choice(part("role"), f"role of {name}", roles, one.role, hidden_label=True),
         ui.make_field(
             part("unit"),
@@ -224,7 +219,3 @@ def _build_row(number: int, one: Row, roles: dict[str, str]) -> list[Any]:
             part("sign"), f"sign of {name}", _SIGNS, "-" if one.reversed else "+", hidden_label=True
         ),
     ]
-
-
-def _render_number(value: float | None) -> Component:
-    return html.Div("–" if value is None else f"{value:.4g}", className="number")

@@ -11,6 +11,7 @@ from dash.development.base_component import Component
 
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.report.blocks import make_table
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.fits import build_fit_table
@@ -25,7 +26,7 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import locks
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import render_block, render_section
+from drivetwin.workbench.views.blocks import render_block, render_section, render_table
 from drivetwin.workbench.views.log import build_facts_line
 
 
@@ -224,4 +225,4 @@ def _describe_inputs(work: SessionState) -> Component:
     if not rows:
         return html.Div()
     caption = "The next run uses these settings besides the vehicle card"
-    return ui.make_table(("set by hand", ""), rows, caption)
+    return render_table(make_table(caption, ("set by hand", ""), rows))

@@ -118,10 +118,10 @@ def build_table(work: SessionState, names: Iterable[str]) -> Component:
         )
         block = make_table("", ("parameter",), ((one,) for one in named))
     controls = [
-        build_controls(work, name, Place.TABLE) if can_fix(name) else "follows from others"
+        [build_controls(work, name, Place.TABLE) if can_fix(name) else "follows from others"]
         for name in listed
     ]
-    return render_table(block, ("lock", controls), "locks")
+    return render_table(block, ["lock"], controls, "locks")
 
 
 def list_default_ids(work: SessionState) -> list[str]:

@@ -10,11 +10,13 @@ from dash.development.base_component import Component
 
 from drivetwin.findings import render
 from drivetwin.logs.formats.detect import SUFFIXES
+from drivetwin.report.blocks import make_table
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import UploadField, get_triggered_part
 from drivetwin.workbench.views.sources import (
     build_file_buttons,
@@ -116,22 +118,27 @@ def _list_logs(work: SessionState) -> list[Component]:
     """List the logs where several are open."""
     if len(work.logs) < 2:
         return []
-    rows: list[list[ui.Content]] = [
-        [
+    rows = [
+        (
             one.source.name,
             "cannot be read" if one.opened.log is None else str(len(one.opened.log.channels)),
             str(len(one.shifts)),
+        )
+        for one in work.logs
+    ]
+    buttons = [
+        [
             html.Button(
                 ["Remove", html.Span(f" {one.source.name}", className="unseen")],
                 id={"remove": str(k)},
                 type="button",
-            ),
+            )
         ]
         for k, one in enumerate(work.logs)
     ]
-    caption = "Open logs, identified together"
+    table = make_table("Open logs, identified together", ("log", "channels", "shifts"), rows)
     return [
-        ui.make_table(("log", "channels", "shifts", ""), rows, caption),
+        render_table(table, [""], buttons),
         html.H3(f"About {work.logs[work.at].source.name}"),
     ]
 

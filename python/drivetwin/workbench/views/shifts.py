@@ -160,7 +160,7 @@ def _build_shifts(work: SessionState) -> list[Component]:
     if not work.all_shifts:
         return [ui.make_notes("No usable shift", rejected, "doubtful")]
     rows: list[tuple[object, ...]] = []
-    uses: list[Component] = []
+    uses: list[list[Component]] = []
     for at, one in enumerate(work.logs):
         for k, (label, shift) in enumerate(
             zip(make_shift_labels(one.shifts), one.shifts, strict=True)
@@ -168,13 +168,13 @@ def _build_shifts(work: SessionState) -> list[Component]:
             elements = f"{shift.offgoing} → {shift.oncoming}"
             times = (shift.torque_phase[0], shift.lockup_time)
             rows.append((label, one.source.name, shift.kind.value, elements, *times))
-            uses.append(_build_use(f"shift {label} of {one.source.name}", at, k, k in one.held))
+            uses.append([_build_use(f"shift {label} of {one.source.name}", at, k, k in one.held)])
     columns = ("shift", "log", "kind", "elements", ("starts [s]", "z.3f"), ("locks [s]", "z.3f"))
     table = make_table("Shifts of all logs", columns, rows)
     several = len(rows) > 1
     return [
         *([ui.make_hint(_HOLD_OUT)] if several else []),
-        render_table(table, ("use", uses) if several else ("", ())),
+        render_table(table, ["use"], uses) if several else render_table(table),
         ui.make_notes("Not used", rejected, "plain"),
     ]
 

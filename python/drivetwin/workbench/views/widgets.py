@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -197,26 +197,6 @@ def make_upload_button(text: str, purpose: str, target: str) -> Component:
         type="button",
         **make_attributes(data_upload=purpose, data_target=target, data_limit=str(LIMITS[purpose])),
     )
-
-
-def make_table(
-    head: Iterable[Content], rows: Iterable[Sequence[Content]], caption: str = "", name: str = ""
-) -> Component:
-    """A table whose first column names the row; the heads of numbers stand above these."""
-    listed = [list(row) for row in rows]
-    body = [
-        html.Tr([html.Th(row[0], scope="row"), *(html.Td(cell) for cell in row[1:])])
-        for row in listed
-    ]
-    classes = [getattr(cell, "className", None) for cell in (listed[0] if listed else ())]
-    top = [
-        html.Th(cell, scope="col", className="number" if name == "number" else "text")
-        for cell, name in itertools.zip_longest(head, classes)
-    ]
-    children = [html.Thead(html.Tr(top)), html.Tbody(body)]
-    if caption:
-        children.insert(0, html.Caption(caption))
-    return html.Div(html.Table(children), className=f"table {name}".strip())
 
 
 def make_notes(title: str, texts: Iterable[str], tone: str = "doubtful") -> Component:

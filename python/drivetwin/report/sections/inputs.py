@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""Tables of what an identification is given: columns of a log and design data of a card."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from drivetwin.report.blocks import TableBlock, make_table
+
+if TYPE_CHECKING:
+    from drivetwin.logs.survey import Column
+    from drivetwin.vehicle.vehicle_card import VehicleCard
+
+
+def build_column_table(
+    columns: Sequence[Column], caption: str = "", *, with_roles: bool = True
+) -> TableBlock:
+    """Build the table of the columns of a log as recorded, with the roles that they have."""
+    rows = [
+        (one.name, one.group, one.unit or "none", one.rate, *(one.range or (None, None)), one.gaps)
+        for one in columns
+    ]
+    roles = [(", ".join(one.roles) or ("ignored" if one.ignored else "–"),) for one in columns]
+    numbers = (("Hz", ".4g"), ("min", ".4g"), ("max", ".4g"), ("gaps", "d"))
+    heads = ("column", "group", "unit", *numbers)
+    if not with_roles:
+        return make_table(caption, heads, rows)
+    return make_table(caption, (*heads, "role"), map(operator.add, rows, roles))
+
+
+def build_card_tables(card: VehicleCard) -> list[TableBlock]:
+    """Build the tables of gears, shift elements and quantities of a vehicle card."""
+    gears = [(gear.name, gear.ratio.value, ", ".join(gear.elements)) for gear in card.gears]
+    elements = [
+        (name, spec.kind, spec.P0.value * 1e-5, spec.gain.value)
+        for name, spec in card.elements.items()
+    ]
+    low, high = card.J_prime_range
+    least, most = card.J_vehicle_range
+    facts = [
+        ("Final drive", f"{card.final_drive.value:.4g}"),
+        ("Inertia at the engine J′", f"{low:.3g} to {high:.3g} kg·m²"),
+        ("Inertia of the vehicle J3", f"{least:.4g} to {most:.4g} kg·m²"),
+        ("Sensor tolerances", ", ".join(card.sensors) or "none: intervals cover noise only"),
+    ]
+    heads = ("element", "kind", ("P0 [bar]", ".3g"), ("gain [m³]", ".4g"))
+    return [
+        make_table("Gears", ("gear", ("ratio", ".4g"), "elements"), gears),
+        make_table("Shift elements", heads, elements),
+        make_table(card.name, ("quantity", "value"), facts),
+    ]
