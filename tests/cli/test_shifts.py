@@ -82,7 +82,8 @@ def test_the_page_shows_shift_quality_by_kind(
     text = page.read_text()
     assert not re.findall(r'(?:src|href)="https?:', text)
     # Request and commanded pressure are not recorded, so there is no response time.
-    assert text.count("<figure>") == 4
+    # Duration, inertia phase, flare, jerk, vibration dose: over the gears and over time.
+    assert text.count("<figure>") == 10
     assert "power-on upshift" in text
 
 
@@ -95,3 +96,17 @@ def test_a_log_without_a_shift_says_which_gear_is_held(
     assert main(["shifts", str(part), "--vehicle", str(bench_files.card)]) == 0
     captured = capsys.readouterr()
     assert "no gear shift; gear held: 2" in captured.out + captured.err
+
+
+def test_a_drive_against_itself_does_not_differ(
+    bench_files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = str(bench_files.log)
+    command = ["shifts", log, "--vehicle", str(bench_files.card), "--against", log]
+    assert main([*command, "--json"]) == 0
+    compared = json.loads(capsys.readouterr().out)["comparison"]
+    assert compared
+    assert all(one["medians"][0] == one["medians"][1] for one in compared)
+    assert all(one["difference"] is None for one in compared)
+    assert main(command) == 0
+    assert "rank-sum tests" in capsys.readouterr().out

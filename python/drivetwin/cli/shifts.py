@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivetwin._util.display_units import format_uncertainty
 from drivetwin._util.outputs import PAGE
-from drivetwin._util.request import output_file
+from drivetwin._util.request import FileRole, input_file, output_file
 from drivetwin.cli.arguments import LogInput, find_mapping
 from drivetwin.cli.output import (
     print_blocks,
@@ -29,12 +29,20 @@ if TYPE_CHECKING:
     from drivetwin.shifts.detect import FoundShifts
     from drivetwin.shifts.lockup_clutch import LockUp
     from drivetwin.shifts.shift import Shift
+    from drivetwin.shifts.summary import FigureComparison
     from drivetwin.vehicle.card import VehicleCard
 
 
 class DetectShifts(LogInput, command="shifts"):
     """Arguments of `shifts`."""
 
+    against: tuple[Path, ...] = input_file(
+        "Log of another vehicle or software state to compare the shift quality with (may be "
+        "repeated).",
+        "LOG",
+        FileRole.LOG,
+        (),
+    )
     output: Path | None = output_file(
         "Page with shift quality by kind of shift.", "FILE.html", PAGE
     )
@@ -43,31 +51,32 @@ class DetectShifts(LogInput, command="shifts"):
 def shifts(request: DetectShifts, *, as_json: bool) -> None:
     """Detect the shifts of a log, with phases and shift quality.
 
+    For several shifts, state the distribution of each figure by kind and gears, outliers and trend.
     For a log without output torque, also estimate the resonance of the driveline after each shift,
     and the total inertia over η in each gear held, as far as the log determines them.
     """
-    from drivetwin.channels.roles import FOR_SHIFTS
     from drivetwin.files.records import dump_findings
-    from drivetwin.logs.read import read_log
     from drivetwin.report.sections.summary import build_phase_table
-    from drivetwin.shifts.detect import detect_shifts, find_gear_spans
+    from drivetwin.shifts.detect import find_gear_spans
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
     from drivetwin.shifts.shift import make_shift_labels
+    from drivetwin.shifts.summary import compare_drives
     from drivetwin.vehicle.card import load_card
 
-    log, output = request.log, request.output
-    with show_step(f"reading {log.name}"):
-        card = load_card(request.vehicle)
-        mapping = find_mapping(request.channels, log)
-        recording = read_log(log, card, mapping, sound=FOR_SHIFTS)
-        found = detect_shifts(recording, card)
+    card = load_card(request.vehicle)
+    recording, found = _find_shifts(request, card, request.log)
+    others = [
+        one for file in request.against for one in _find_shifts(request, card, file)[1].shifts
+    ]
+    comparison = compare_drives(found.shifts, others)
     closings = detect_lock_ups(recording, card)
     seen = _estimate_from_speeds(recording, card, found.shifts)
-    if output is not None and found.shifts:
-        _write_page(output, found.shifts, log.name)
+    if request.output is not None and found.shifts:
+        _write_page(request.output, found.shifts, recording, comparison)
     if as_json:
         remarks = {"findings": dump_findings(recording.findings)}
-        print_json(_to_document(found, closings, seen) | remarks)
+        compared = {"comparison": [asdict(one) for one in comparison]} if request.against else {}
+        print_json(_to_document(found, closings, seen) | compared | remarks)
         return
     labels = make_shift_labels(found.shifts)
     print_blocks(build_phase_table(*one) for one in zip(labels, found.shifts, strict=True))
@@ -75,18 +84,44 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
         held = ", ".join(dict.fromkeys(gear for gear, _ in find_gear_spans(recording, card)))
         print_paragraph(f"no gear shift; gear held: {held or 'none'}")
     _print_details(found, closings, seen)
+    if request.against:
+        _print_comparison(comparison)
     print_findings(recording.findings)
-    if output is not None and found.shifts:
-        print_line(f"wrote {output}")
+    if request.output is not None and found.shifts:
+        print_line(f"wrote {request.output}")
 
 
-def _write_page(path: Path, shifts: Sequence[Shift], log: str) -> None:
+def _find_shifts(
+    request: DetectShifts, card: VehicleCard, file: Path
+) -> tuple[ShiftLog, FoundShifts]:
+    from drivetwin.channels.roles import FOR_SHIFTS
+    from drivetwin.logs.read import read_log
+    from drivetwin.shifts.detect import detect_shifts
+
+    with show_step(f"reading {file.name}"):
+        mapping = find_mapping(request.channels, file)
+        recording = read_log(file, card, mapping, sound=FOR_SHIFTS)
+        return recording, detect_shifts(recording, card)
+
+
+def _write_page(
+    path: Path, shifts: Sequence[Shift], log: ShiftLog, comparison: Sequence[FigureComparison]
+) -> None:
     """Write a page with the shift quality of a drive."""
     from drivetwin._util.atomic import write_text
     from drivetwin.report.whole_drive import render_whole_drive
 
     with show_step(f"writing {path.name}"):
-        write_text(path, render_whole_drive(shifts, log))
+        write_text(path, render_whole_drive(shifts, log, comparison))
+
+
+def _print_comparison(comparison: Sequence[FigureComparison]) -> None:
+    from drivetwin.report.whole_drive import build_comparison_table
+
+    if comparison:
+        print_blocks([build_comparison_table(comparison)])
+    else:
+        print_paragraph("comparison: no shifts of the same kind and gears in both")
 
 
 class _SpeedResults(NamedTuple):

@@ -4,55 +4,97 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from drivetwin._util.display_units import format_significant, get_display_unit
-from drivetwin.report.blocks import Column, FigureBlock, Section, TableBlock, make_table
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.report.blocks import (
+    Cell,
+    Column,
+    FigureBlock,
+    Section,
+    TableBlock,
+    make_number,
+    make_table,
+)
 from drivetwin.report.figure import Figure
+from drivetwin.report.figures.recording import plot_shift_phases
 from drivetwin.report.html import render_page
 from drivetwin.report.style import get_candidate_style, make_axis, make_layout
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.summary import SUMMARIZED, ShiftGroup, summarize_shifts
+from drivetwin.shifts.statistics import LEVEL, Trend
+from drivetwin.shifts.summary import SUMMARIZED, FigureComparison, ShiftGroup, summarize_shifts
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 _BESIDE = 3
 """So many shifts beside each other in a table."""
 
 
-def render_whole_drive(shifts: Sequence[Shift], log: str) -> str:
-    """HTML text of the page: a table and a figure of each summarised figure of shift quality.
+def render_whole_drive(
+    shifts: Sequence[Shift], log: ShiftLog, comparison: Sequence[FigureComparison] = ()
+) -> str:
+    """HTML text of the page: each summarised figure of shift quality, and outlying shifts.
 
     Parameters
     ----------
     shifts : shifts of the drive
-    log : name of the log, for the title
+    log : log of the drive
+    comparison : comparison with another drive
     """
     groups = summarize_shifts(shifts)
+    sections = list(_build_sections(shifts, groups))
+    summaries = [one for group in groups for one in group.figures.values()]
+    outlying = {outlier.time for one in summaries for outlier in one.outliers}
+    if outlying:
+        text = "Shifts of which a figure is an outlier, in their place in the log."
+        figures = [
+            FigureBlock(plot_shift_phases(log, one), f"{_format_gears(one)}, {one.kind.value}.")
+            for one in shifts
+            if one.lockup_time in outlying
+        ]
+        table = build_outlier_table(groups)
+        sections.append(Section(_OUTLIERS, "Outliers", text, [table, *figures]))
+    if comparison:
+        text = "Shifts of the same kind and gears in both."
+        table = build_comparison_table(comparison)
+        sections.append(Section("comparison", "Comparison", text, [table]))
     return render_page(
-        title=f"Shifts of {log}",
+        title=f"Shifts of {Path(log.source).name}",
         subtitle=f"{len(shifts)} shifts from {shifts[0].lockup_time:z.1f} to "
         f"{shifts[-1].lockup_time:z.1f} s",
-        sections=list(_build_sections(shifts, groups)),
+        sections=sections,
     )
 
 
 def _build_sections(shifts: Sequence[Shift], groups: Sequence[ShiftGroup]) -> Iterator[Section]:
     for name, table in build_summary_tables(groups).items():
         label = _get_label(name)
-        figure = FigureBlock(plot_quality(name, shifts), f"{label} of each shift.")
-        text = "The spread is the standard deviation between the shifts, the worst is the largest."
-        yield Section(name, label, text, [figure, table])
+        figures = [
+            FigureBlock(plot_quality(name, shifts), f"{label} of each shift."),
+            FigureBlock(plot_quality(name, shifts, over_time=True), f"{label} over the drive."),
+        ]
+        text = (
+            "Outliers are tested by Rosner's generalised Studentized deviate, trends by Kendall's "
+            "rank correlation, each at 5 %; trends are corrected for their number."
+        )
+        yield Section(name, label, text, [figures[0], table, figures[1]])
 
 
 def _get_label(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
 
+_HOUR = 3600.0
+_OUTLIERS = "outliers"
+
+
 def build_summary_tables(groups: Sequence[ShiftGroup]) -> dict[str, TableBlock]:
     """Build one table for each figure of shift quality, by name: statistics by kind and gears."""
     columns = (
-        *("kind", "gears"),
-        *(("shifts", "d"), ("mean", "3"), ("spread", "s"), ("worst", "3"), ("at s", "z.2f")),
+        *("kind of shift", "gears", ("shifts", "d"), ("median", "3"), ("10..90 %", "s")),
+        *(("worst", "3"), make_number("at s", secondary=True)),
+        *(("outliers at s", "s"), ("trend per h", "s")),
     )
     tables = {}
     for name in SUMMARIZED:
@@ -61,16 +103,66 @@ def build_summary_tables(groups: Sequence[ShiftGroup]) -> dict[str, TableBlock]:
         for group in groups:
             if (one := group.figures.get(name)) is None:
                 continue
-            spread = (
-                "" if one.spread is None else format_significant(display.factor * one.spread, 3)
-            )
-            mean, worst = display.factor * one.mean, display.factor * one.worst
-            numbers = (one.count, mean, spread, worst, one.worst_time)
-            rows.append((group.kind.value, group.gears or "all", *numbers))
+            low, high = (format_significant(display.factor * end, 3) for end in (one.low, one.high))
+            median, worst = display.factor * one.median, display.factor * one.worst
+            when = f"{one.worst_time:z.2f}"
+            numbers = (one.count, median, f"{low}..{high}", worst, when)
+            times = " ".join(f"{outlier.time:z.2f}" for outlier in one.outliers)
+            outliers = Cell(times, number=True, href=f"#{_OUTLIERS}" if times else "")
+            trend = _make_trend_cell(one.trend, display.factor)
+            rows.append((group.kind.value, group.gears or "all", *numbers, outliers, trend))
         if rows:
             caption = f"{_get_label(name)} by kind of shift, in {display.label}"
             tables[name] = make_table(caption, columns, rows)
     return tables
+
+
+def build_outlier_table(groups: Sequence[ShiftGroup]) -> TableBlock:
+    """Build the table of outlying shifts with the figure that is one."""
+    columns = ("figure", "shift", ("lock-up at s", "z.2f"), ("value", "3"), ("median", "3"))
+    rows: list[tuple[object, ...]] = []
+    for group in groups:
+        shift = f"{group.gears}, {group.kind.value}"
+        for name, one in group.figures.items():
+            display = get_display_unit(QUALITY_UNITS[name])
+            label = f"{_get_label(name)} [{display.label}]"
+            for outlier in one.outliers:
+                values = (display.factor * each for each in (outlier.value, one.median))
+                rows.append((label, shift, outlier.time, *values))
+    return make_table("Outliers", columns, rows)
+
+
+def _make_trend_cell(trend: Trend | None, factor: float) -> Cell:
+    """Make the cell of a slope per hour with its interval; empty where it is not significant."""
+    if trend is None or trend.p >= LEVEL:
+        return Cell("", number=True)
+    ends = (trend.slope, *trend.interval)
+    slope, low, high = (format_significant(_HOUR * factor * end, 3) for end in ends)
+    return Cell(slope, number=True, note=f"{low}..{high}")
+
+
+def build_comparison_table(comparison: Sequence[FigureComparison]) -> TableBlock:
+    """Build the table of two drives: medians, difference with 95 % interval, verdict."""
+    columns = (
+        *("figure", "shift", make_number("shifts", secondary=True), ("medians", "s")),
+        *(("difference, 95 %", "s"), make_number("p", secondary=True), "verdict"),
+    )
+    rows = []
+    for one in comparison:
+        display = get_display_unit(QUALITY_UNITS[one.figure])
+        medians = " ".join(format_significant(display.factor * each, 3) for each in one.medians)
+        difference, p, verdict = "", "", "too few shifts"
+        if one.difference is not None:
+            ends = (one.difference.shift, *one.difference.interval)
+            middle, low, high = (format_significant(display.factor * each, 2) for each in ends)
+            difference, p = f"{middle} ({low}..{high})", f"{one.difference.p:.2g}"
+            verdict = "differ" if one.differs else "not shown"
+        label = f"{_get_label(one.figure)} [{display.label}]"
+        counts = " ".join(map(str, one.counts))
+        shift = f"{one.gears}, {one.kind.value}"
+        rows.append((label, shift, counts, medians, difference, p, verdict))
+    caption = "This drive, then the other: rank-sum tests, corrected for their number"
+    return make_table(caption, columns, rows)
 
 
 def build_quality_tables(shifts: Sequence[Shift]) -> Iterator[TableBlock]:
@@ -89,13 +181,14 @@ def build_quality_tables(shifts: Sequence[Shift]) -> Iterator[TableBlock]:
         yield make_table("Shift quality", columns, rows)
 
 
-def plot_quality(name: str, shifts: Sequence[Shift]) -> Figure:
-    """One figure of shift quality over the pairs of gears: a point for each shift.
+def plot_quality(name: str, shifts: Sequence[Shift], *, over_time: bool = False) -> Figure:
+    """One figure of shift quality over the pairs of gears or over time: a point for each shift.
 
     Parameters
     ----------
     name : a key of `QUALITY_UNITS`
     shifts : shifts of the drive; those without the figure are left out
+    over_time : the axis is the time of lock-up
     """
     display = get_display_unit(QUALITY_UNITS[name])
     shown = [one for one in shifts if name in one.quality]
@@ -108,20 +201,20 @@ def plot_quality(name: str, shifts: Sequence[Shift]) -> Figure:
         alike = [one for one in shown if one.kind is kind]
         style = get_candidate_style(k)
         figure.add_scatter(
-            x=[_format_gears(one) for one in alike],
+            x=[one.lockup_time if over_time else _format_gears(one) for one in alike],
             y=[display.factor * one.quality[name] for one in alike],
             mode="markers",
             name=kind.value,
-            text=[f"{one.lockup_time:.2f} s" for one in alike],
+            text=[f"{_format_gears(one)} at {one.lockup_time:.2f} s" for one in alike],
             marker={"color": style.colour, "symbol": style.symbol, "size": 8},
-            hovertemplate=f"%{{x}}: %{{y:.3g}} {display.label}, lock-up at %{{text}}"
-            f"<extra>{kind.value}</extra>",
+            hovertemplate=f"%{{text}}: %{{y:.3g}} {display.label}<extra>{kind.value}</extra>",
         )
     label = name.replace("_", " ")
+    axis = make_axis("gears", type="category", categoryorder="array", categoryarray=order)
     figure.set_layout(
         make_layout(
             300,
-            xaxis=make_axis("gears", type="category", categoryorder="array", categoryarray=order),
+            xaxis=make_axis("lock-up [s]") if over_time else axis,
             yaxis=make_axis(f"{label} [{display.label}]", rangemode="tozero"),
             showlegend=True,
         )

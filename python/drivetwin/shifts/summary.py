@@ -1,21 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""Summary of the shifts of a drive, by kind and by pair of gears."""
+"""Summary of the shifts of a drive by kind and pair of gears, and comparison of two drives."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin.findings import Code, Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.shifts.statistics import (
+    LEVEL,
+    Difference,
+    Trend,
+    adjust_p_values,
+    compare_groups,
+    estimate_trend,
+    find_outliers,
+)
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 SUMMARIZED = (
     "shift_time",
     "inertia_phase_time",
     "response_time",
+    "flare_speed",
     "wheel_jerk_max",
     "wheel_jerk_of_speed_max",
     "vibration_dose",
@@ -24,17 +34,31 @@ SUMMARIZED = (
 
 
 @dataclass(frozen=True)
-class FigureSummary:
-    """One figure of `count` shifts in its SI unit, with the lock-up time [s] of the worst.
+class Outlier:
+    """Figure of an outlying shift in its SI unit, and the time of its lock-up [s]."""
 
-    `spread` is the standard deviation between the shifts; None for one shift.
+    time: float
+    value: float
+
+
+@dataclass(frozen=True)
+class FigureSummary:
+    """Distribution of one figure over `count` shifts in its SI unit.
+
+    `low` and `high` contain the middle 80 %; `worst_time` is the lock-up of the worst [s].
+    `trend` over time has a p-value adjusted for all trends of the drive. It and `outliers` are
+    given for one pair of gears, since shifts of different gears differ.
     """
 
     count: int
     mean: float
-    spread: float | None
+    median: float
+    low: float
+    high: float
     worst: float
     worst_time: float
+    outliers: tuple[Outlier, ...] = ()
+    trend: Trend | None = None
 
 
 @dataclass(frozen=True)
@@ -51,14 +75,19 @@ def summarize_shifts(shifts: Sequence[Shift]) -> tuple[ShiftGroup, ...]:
     """Group shifts by kind, each followed by its pairs of gears where there are several."""
     groups = []
     for kind in ShiftKind:
-        alike = [one for one in shifts if one.kind is kind]
-        pairs: dict[str, list[Shift]] = {}
-        for one in alike:
-            pairs.setdefault(f"{one.start_gear}→{one.end_gear}", []).append(one)
+        pairs = {gears: alike for (own, gears), alike in _split(shifts).items() if own is kind}
         if len(pairs) > 1:
-            groups.append(_summarize_group(kind, None, alike))
+            groups.append(_summarize_group(kind, None, [one for one in shifts if one.kind is kind]))
         groups += [_summarize_group(kind, gears, pairs[gears]) for gears in sorted(pairs)]
-    return tuple(groups)
+    return _adjust_trends(groups)
+
+
+def _split(shifts: Sequence[Shift]) -> Mapping[tuple[ShiftKind, str], list[Shift]]:
+    """Shifts by kind and pair of gears."""
+    found: dict[tuple[ShiftKind, str], list[Shift]] = {}
+    for one in shifts:
+        found.setdefault((one.kind, f"{one.start_gear}→{one.end_gear}"), []).append(one)
+    return found
 
 
 def _summarize_group(kind: ShiftKind, gears: str | None, shifts: Sequence[Shift]) -> ShiftGroup:
@@ -67,11 +96,99 @@ def _summarize_group(kind: ShiftKind, gears: str | None, shifts: Sequence[Shift]
         found = [(one.quality[name], one.lockup_time) for one in shifts if name in one.quality]
         if not found:
             continue
-        values = np.array([value for value, _ in found])
+        values, times = np.array(found).T
+        low, median, high = np.quantile(values, (0.1, 0.5, 0.9))
         worst, when = max(found)
-        spread = float(values.std(ddof=1)) if len(found) > 1 else None
-        figures[name] = FigureSummary(len(found), float(values.mean()), spread, worst, when)
+        summary = FigureSummary(
+            *(len(found), float(values.mean())),
+            *(float(median), float(low), float(high), worst, when),
+        )
+        if gears is not None:
+            outliers = tuple(
+                Outlier(float(times[index]), float(values[index]))
+                for index in sorted(find_outliers(values))
+            )
+            summary = replace(summary, outliers=outliers, trend=estimate_trend(times, values))
+        figures[name] = summary
     return ShiftGroup(kind, gears, len(shifts), figures)
+
+
+def _adjust_trends(groups: Sequence[ShiftGroup]) -> tuple[ShiftGroup, ...]:
+    """Adjust the p-values of all trends for their number."""
+    trends = [one.trend for group in groups for one in group.figures.values() if one.trend]
+    adjusted = iter(adjust_p_values([one.p for one in trends]))
+    return tuple(
+        replace(
+            group,
+            figures={
+                name: replace(one, trend=replace(one.trend, p=next(adjusted))) if one.trend else one
+                for name, one in group.figures.items()
+            },
+        )
+        for group in groups
+    )
+
+
+@dataclass(frozen=True)
+class FigureComparison:
+    """One figure of the shifts of one kind and pair of gears in two drives, in its SI unit.
+
+    `counts` and `medians` of the first and the second. `difference` has a p-value adjusted for all
+    comparisons of the two drives; None with too few shifts.
+    """
+
+    kind: ShiftKind
+    gears: str
+    figure: str
+    counts: tuple[int, int]
+    medians: tuple[float, float]
+    difference: Difference | None
+
+    @property
+    def differs(self) -> bool | None:
+        """True where the drives differ, False where that is not shown, None with too few shifts."""
+        return None if self.difference is None else self.difference.p < LEVEL
+
+
+def compare_drives(first: Sequence[Shift], second: Sequence[Shift]) -> tuple[FigureComparison, ...]:
+    """Compare the shift quality of two vehicles or software states.
+
+    Parameters
+    ----------
+    first, second : shifts of one drive or of several
+
+    Returns
+    -------
+    tuple of FigureComparison
+        One for each figure of the shifts of a kind and pair of gears that both have.
+    """
+    before, after = _split(first), _split(second)
+    found = []
+    for kind, gears in sorted(before.keys() & after.keys()):
+        for name in SUMMARIZED:
+            pair = [
+                np.array([one.quality[name] for one in side[kind, gears] if name in one.quality])
+                for side in (before, after)
+            ]
+            if not all(one.size for one in pair):
+                continue
+            counts, medians = [len(one) for one in pair], [float(np.median(one)) for one in pair]
+            found.append(
+                FigureComparison(
+                    *(kind, gears, name),
+                    (counts[0], counts[1]),
+                    (medians[0], medians[1]),
+                    compare_groups(*pair),
+                )
+            )
+    tested = [one.difference for one in found if one.difference is not None]
+    adjusted = iter(adjust_p_values([one.p for one in tested]))
+    return tuple(
+        one
+        if one.difference is None
+        else replace(one, difference=replace(one.difference, p=next(adjusted)))
+        for one in found
+    )
 
 
 def collect_findings(shifts: Iterable[Shift]) -> tuple[tuple[Finding, tuple[str, ...]], ...]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivetwin._util.display_units import BAR, NM, RPM, Display
-from drivetwin.channels.roles import Quantity
+from drivetwin.channels.roles import Quantity, make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import (
@@ -93,32 +93,26 @@ def plot_shift_phases(log: ShiftLog, shift: Shift) -> Figure:
 
 
 def build_shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
-    """Return the panels of `plot_shift_phases` from top to bottom."""
-    pressures = [
-        _build_measured_curve(
-            f"{shift.offgoing} (off-going)", log.get_pressure(shift.offgoing), COMPARED
-        ),
-        _build_measured_curve(
-            f"{shift.oncoming} (on-coming)", log.get_pressure(shift.oncoming), SECOND
-        ),
-    ]
-    panels = [
-        Panel(
-            "engine torque", NM, [_build_measured_curve("T_e", log["engine_torque"], MEASURED)], 0.8
-        ),
-        Panel("pressure", BAR, pressures),
-    ]
-    if "output_torque" in log:
-        curve = _build_measured_curve("T_o", log["output_torque"], MEASURED)
-        panels.append(Panel("output torque", NM, [curve], 1.3))
-    for title, speeds in _SPEEDS:
+    """Return the panels of `plot_shift_phases` from top to bottom, of the channels there are."""
+    pressures = {
+        make_pressure_role(shift.offgoing): (f"{shift.offgoing} (off-going)", COMPARED),
+        make_pressure_role(shift.oncoming): (f"{shift.oncoming} (on-coming)", SECOND),
+    }
+    groups = (
+        ("engine torque", NM, {"engine_torque": ("T_e", MEASURED)}, 0.8),
+        ("pressure", BAR, pressures, 1.0),
+        ("output torque", NM, {"output_torque": ("T_o", MEASURED)}, 1.3),
+        *((title, RPM, speeds, 0.9) for title, speeds in _SPEEDS),
+    )
+    panels = []
+    for title, display, roles, weight in groups:
         curves = [
             _build_measured_curve(name, log[role], colour)
-            for role, (name, colour) in speeds.items()
+            for role, (name, colour) in roles.items()
             if role in log
         ]
         if curves:
-            panels.append(Panel(title, RPM, curves, 0.9))
+            panels.append(Panel(title, display, curves, weight))
     return panels
 
 

@@ -11,12 +11,13 @@ from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin.findings import render
-from drivetwin.report.blocks import make_table
+from drivetwin.report.blocks import TableBlock, make_table
 from drivetwin.report.figures.recording import build_shift_panels
 from drivetwin.report.figures.stack import Panel
 from drivetwin.report.sections.summary import build_phase_table, describe_phases
-from drivetwin.report.whole_drive import build_quality_tables
-from drivetwin.shifts.shift import make_shift_labels
+from drivetwin.report.whole_drive import build_quality_tables, build_summary_tables
+from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.shifts.summary import summarize_shifts
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.phases import (
     LABELS,
@@ -239,4 +240,10 @@ def _build_content(work: SessionState) -> list[Component]:
         ui.make_notes("About this shift", render(shift.findings)),
         render_table(build_phase_table(names[str(work.shift)], shift)),
         *map(render_table, build_quality_tables([shift])),
+        *map(render_table, _build_summary(work.shifts)),
     ]
+
+
+def _build_summary(shifts: Sequence[Shift]) -> Sequence[TableBlock]:
+    """Build the statistics of all shifts of the log; none for a single shift."""
+    return list(build_summary_tables(summarize_shifts(shifts)).values()) if shifts[1:] else []
