@@ -22,6 +22,7 @@ from drivetwin.fleet.mixed_model.observations import collect_facts
 from drivetwin.fleet.mixed_model.reasons import collect_output_fits
 from drivetwin.fleet.mixed_model.result import Interval, JointEstimate, Outlier
 from drivetwin.fleet.pages import LIBRARY
+from drivetwin.fleet.quality import collect_unit_figures, compare_units, merge_figures
 from drivetwin.fleet.rules import format_reading, format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
@@ -33,6 +34,7 @@ from drivetwin.report.blocks import (
     FigureBlock,
     NotesBlock,
     Section,
+    TableBlock,
     Tile,
     TilesBlock,
     Tone,
@@ -45,6 +47,8 @@ from drivetwin.report.figures.friction import plot_friction
 from drivetwin.report.html import render_page
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.parameters import make_parameter_cell
+from drivetwin.report.whole_drive import build_comparison_table
+from drivetwin.shifts.quality import QUALITY_UNITS
 
 PAGE = "report.html"
 
@@ -72,6 +76,7 @@ def render_fleet(
         _build_outlier_section(store, found, folder),
         build_ageing_section(found),
         _build_friction_section(store),
+        _build_quality_section(store),
         build_single_logs_section(store, folder),
         _build_failure_section(store),
         _build_settings_section(store),
@@ -344,6 +349,34 @@ def _build_friction_section(store: Store) -> Section:
         for element, curve in compute_fleet_friction(store).items()
     ]
     return Section("friction", "Friction of the fleet", "μ over slip of every log.", blocks)
+
+
+def _build_quality_section(store: Store) -> Section:
+    """Show each figure of shift quality over the fleet, and the units that differ from the rest."""
+    units = collect_unit_figures(store)
+    rows = []
+    for (kind, gears, name), values in merge_figures(units.values()).items():
+        display = get_display_unit(QUALITY_UNITS[name])
+        low, median, high = (display.factor * np.quantile(values, (0.1, 0.5, 0.9))).tolist()
+        label = f"{name.replace('_', ' ').capitalize()} [{display.label}]"
+        rows.append((label, f"{gears}, {kind.value}", values.size, median, low, high))
+    columns = (
+        *("figure", "shift", ("shifts", "d"), ("median", "3")),
+        *(("10 %", "3"), ("90 %", "3")),
+    )
+    blocks: list[Block] = [make_table("Shift quality of the fleet", columns, rows)] if rows else []
+    odd = [(unit, one) for unit, one in compare_units(units) if one.differs]
+    if odd:
+        table = build_comparison_table([one for _, one in odd[:MOST_ROWS]])
+        head = (Cell("unit"), *table.head)
+        body = [(Cell(unit), *row) for (unit, _), row in zip(odd, table.rows, strict=False)]
+        caption = f"Units that differ from all others{make_truncation_caption(len(odd))}."
+        blocks.append(TableBlock(caption, head, body))
+    text = (
+        "Medians are those of the others, then of the unit. Rank-sum tests at 5 %, corrected for "
+        "their number."
+    )
+    return Section("quality", "Shift quality", text, blocks)
 
 
 def _build_failure_section(store: Store) -> Section:

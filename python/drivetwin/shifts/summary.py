@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.findings import Code, Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.shifts.statistics import (
@@ -150,6 +151,10 @@ class FigureComparison:
         return None if self.difference is None else self.difference.p < LEVEL
 
 
+FiguresByKind = Mapping[tuple[ShiftKind, str, str], FloatArray]
+"""Values (n,) of figures of shift quality in SI by kind, pair of gears and name of the figure."""
+
+
 def compare_drives(first: Sequence[Shift], second: Sequence[Shift]) -> tuple[FigureComparison, ...]:
     """Compare the shift quality of two vehicles or software states.
 
@@ -160,34 +165,52 @@ def compare_drives(first: Sequence[Shift], second: Sequence[Shift]) -> tuple[Fig
     Returns
     -------
     tuple of FigureComparison
-        One for each figure of the shifts of a kind and pair of gears that both have.
+        One for each figure of the shifts of a kind and pair of gears that both have, with p-values
+        adjusted for their number.
     """
-    before, after = _split(first), _split(second)
-    found = []
-    for kind, gears in sorted(before.keys() & after.keys()):
-        for name in SUMMARIZED:
-            pair = [
-                np.array([one.quality[name] for one in side[kind, gears] if name in one.quality])
-                for side in (before, after)
-            ]
-            if not all(one.size for one in pair):
-                continue
-            counts, medians = [len(one) for one in pair], [float(np.median(one)) for one in pair]
-            found.append(
-                FigureComparison(
-                    *(kind, gears, name),
-                    (counts[0], counts[1]),
-                    (medians[0], medians[1]),
-                    compare_groups(*pair),
-                )
-            )
-    tested = [one.difference for one in found if one.difference is not None]
+    return adjust_comparisons(compare_figures(_collect_figures(first), _collect_figures(second)))
+
+
+def _collect_figures(shifts: Sequence[Shift]) -> FiguresByKind:
+    return {
+        (kind, gears, name): np.array([one.quality[name] for one in alike if name in one.quality])
+        for (kind, gears), alike in _split(shifts).items()
+        for name in SUMMARIZED
+        if any(name in one.quality for one in alike)
+    }
+
+
+def compare_figures(first: FiguresByKind, second: FiguresByKind) -> tuple[FigureComparison, ...]:
+    """Compare the figures that both groups have; p-values are those of the single tests.
+
+    Parameters
+    ----------
+    first, second : figures of the groups
+
+    Returns
+    -------
+    tuple of FigureComparison
+    """
+    return tuple(
+        FigureComparison(
+            *key,
+            (first[key].size, second[key].size),
+            (float(np.median(first[key])), float(np.median(second[key]))),
+            compare_groups(first[key], second[key]),
+        )
+        for key in sorted(first.keys() & second.keys())
+    )
+
+
+def adjust_comparisons(comparisons: Sequence[FigureComparison]) -> tuple[FigureComparison, ...]:
+    """Adjust the p-values of comparisons made together for their number."""
+    tested = [one.difference for one in comparisons if one.difference is not None]
     adjusted = iter(adjust_p_values([one.p for one in tested]))
     return tuple(
         one
         if one.difference is None
         else replace(one, difference=replace(one.difference, p=next(adjusted)))
-        for one in found
+        for one in comparisons
     )
 
 
