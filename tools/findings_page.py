@@ -83,7 +83,8 @@ def _write_row(code: str, entry: dict[str, str], question: str) -> str:
     severity = entry.get("severity", "")
     remedy = f". *{_escape(entry['remedy'])}.*" if "remedy" in entry else ""
     name = f"`{code}`" + (f" ({severity})" if severity else "")
-    return f"| {name} | {_escape(entry['text'])}{remedy} | [{question}](../questions.md#{make_anchor(question)}) |"
+    answer = f"[{question}](../questions.md#{make_anchor(question)})"
+    return f"| {name} | {_escape(entry['text'])}{remedy} | {answer} |"
 
 
 def _escape(text: str) -> str:
