@@ -70,7 +70,7 @@ test-rust: $(venv)/.dev ## tests of the core
 
 .PHONY: test-python
 test-python: $(venv)/.dev native ## tests of the package, without the suites that take long
-	$(pytest)
+	$(pytest) --durations 50 --durations-min 2
 
 .PHONY: test-short
 test-short: $(venv)/.dev native ## one short case of each suite that takes long
