@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from enum import Enum
 from typing import Any
@@ -28,3 +29,9 @@ def to_plain_values(value: Any) -> Any:
     if isinstance(value, bool | int | str | None):
         return value
     return convert_nonfinite(value) if isinstance(value, float) else str(value)
+
+
+def format_json(value: Any) -> str:
+    """Write a value as strict JSON text: no NaN, plain types, readable."""
+    text = json.dumps(to_plain_values(value), allow_nan=False, ensure_ascii=False, indent=2)
+    return text + "\n"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationError
 from pydantic_core import CoreSchema
 
 from drivetwin._util.regular_file import measure_regular_file
@@ -171,6 +171,34 @@ def format_text(text: str) -> str:
 def format_key(key: str) -> str:
     """Write one part of a key, in quotes where TOML needs them."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else format_text(key)
+
+
+def format_value(value: Any) -> str:
+    """Write a text, a number, or a table or list of such as a value of TOML."""
+    match value:
+        case str():
+            return format_text(value)
+        case bool():
+            return "true" if value else "false"
+        case Mapping():
+            return f"{{{', '.join(format_entry(*item) for item in value.items())}}}"
+        case list() | tuple():
+            return f"[{', '.join(map(format_value, value))}]"
+        case int():
+            return repr(value)
+    return repr(float(value))
+
+
+def format_entry(key: str, value: Any) -> str:
+    """Write an entry of a table of TOML."""
+    return f"{format_key(key)} = {format_value(value)}"
+
+
+def list_stated(table: Any) -> dict[str, Any]:
+    """List the entries that differ from their default of a dataclass without units, by key."""
+    adapter = TypeAdapter[Any](type(table))
+    entries: dict[str, Any] = adapter.dump_python(table, by_alias=True, exclude_defaults=True)
+    return entries
 
 
 def _escape(char: str) -> str:

@@ -4,10 +4,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
-from drivetwin._util.toml import format_key, format_text, parse_toml, raise_faults
+from drivetwin._util.toml import (
+    format_entry,
+    format_key,
+    format_value,
+    list_stated,
+    parse_toml,
+    raise_faults,
+)
 from drivetwin._util.visible_text import escape_line
 from drivetwin.authoring.answers import (
     UNKNOWN,
@@ -24,7 +31,6 @@ from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
 from drivetwin.authoring.stated_number import StatedNumber
-from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import check_card
 from drivetwin.vehicle.card_fields import get_card_field
@@ -223,26 +229,8 @@ def _format_channels(answers: Answers, survey: LogSurvey | None) -> Iterator[str
         yield "# the pressure belongs to the element of the gear."
     for element, spec in specs.items():
         yield f"[channels.pressure.{format_key(element)}]"
-        yield from _format_spec(spec)
+        yield from (format_entry(*item) for item in list_stated(spec).items())
         yield ""
-
-
-def _format_spec(spec: ChannelSpec) -> Iterator[str]:
-    texts: Mapping[str, str | None] = {
-        "source": spec.source, "group": spec.group, "unit": spec.unit,
-    }  # fmt: skip
-    for key, text in texts.items():
-        if text is not None:
-            yield f"{key} = {format_text(text)}"
-    numbers: Sequence[tuple[str, float, float]] = (
-        ("sign", spec.sign, 1),
-        ("scale", spec.scale, 1.0),
-        ("offset", spec.offset, 0.0),
-        ("time_shift_s", spec.time_shift, 0.0),
-    )
-    for key, number, usual in numbers:
-        if number != usual:
-            yield f"{key} = {number!r}"
 
 
 def _format_field(answers: Answers, *key: str) -> Iterator[str]:
@@ -253,18 +241,9 @@ def _format_field(answers: Answers, *key: str) -> Iterator[str]:
     if answer.value is None:
         yield f"# {field.entry} = ...{_format_note(answer)}"
     else:
-        yield f"{field.entry} = {_format_value(answer.value)}{_format_note(answer)}"
-
-
-def _format_value(value: object) -> str:
-    """Write a value in TOML; a stated number in its own digits."""
-    if isinstance(value, StatedNumber):
-        return value.entry
-    if isinstance(value, str):
-        return format_text(value)
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_format_value, value))}]"
-    return repr(value)
+        value = answer.value
+        text = value.entry if isinstance(value, StatedNumber) else format_value(value)
+        yield f"{field.entry} = {text}{_format_note(answer)}"
 
 
 def _format_note(answer: Answer) -> str:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
-from drivetwin._util.toml import format_key, format_text
+from drivetwin._util.toml import format_entry, format_key, format_text, format_value, list_stated
 from drivetwin._util.visible_text import escape_line
 from drivetwin.channels.read_options import ChannelSpec, ReadOptions
 from drivetwin.channels.roles import get_element, get_place, get_quantity
@@ -93,14 +94,14 @@ def format_mapping(
     for name, entries in _list_options(options or ReadOptions()).items():
         open_unit = draft.time if name == "time" and "unit" not in entries else None
         if entries or open_unit is not None:
-            lines += ["", f"[{name}]", *(f"{key} = {text}" for key, text in entries.items())]
+            lines += ["", f"[{name}]", *(format_entry(*item) for item in entries.items())]
         if open_unit is not None:
             lines += _format_unit_gap(open_unit, draft.accept, ())
     if draft.time_source and "source" not in _list_options(options or ReadOptions())["time"]:
         lines += ["", "# [time]", '# source = "..."', '# unit = "s"']
     if draft.databases and not (options or ReadOptions()).bus.databases:
-        listed = ", ".join(map(format_text, draft.databases))
-        lines += ["", "# DBC files of a bus log.", "# [bus]", f"# dbc = [{listed}]"]
+        entry = format_entry("dbc", draft.databases)
+        lines += ["", "# DBC files of a bus log.", "# [bus]", f"# {entry}"]
     if names:
         lines += _format_names(names)
     for role, spec in channels.items():
@@ -120,26 +121,19 @@ def _format_path(role: str) -> str:
     return role if element is None else role.removesuffix(element) + format_key(element)
 
 
-def _list_options(options: ReadOptions) -> dict[str, dict[str, str]]:
-    """List the entries of `[time]`, `[bus]` and `[columns]` as TOML, those that are stated."""
-    time, bus = options.time, options.bus
-    ignored = ", ".join(map(format_text, options.ignored))
-    paths = [format_text(str(path.resolve())) for path in bus.databases]
-    torque = bus.reference_torque
-    entries: dict[str, dict[str, str | None]] = {
-        "time": {
-            "source": None if time.source is None else format_text(time.source),
-            "unit": None if time.unit is None else format_text(time.unit),
-            "simultaneous": "true" if time.simultaneous else None,
-        },
+def _list_options(options: ReadOptions) -> dict[str, dict[str, Any]]:
+    """List the entries of `[time]`, `[bus]` and `[columns]`, those that are stated."""
+    bus = options.bus
+    entries = {
+        "time": list_stated(options.time),
         "bus": {
-            "dbc": f"[{', '.join(paths)}]" if paths else None,
-            "reference_torque_Nm": None if torque is None else repr(float(torque)),
+            "dbc": [str(path.resolve()) for path in bus.databases],
+            "reference_torque_Nm": bus.reference_torque,
         },
-        "columns": {"ignored": f"[{ignored}]" if ignored else None},
+        "columns": {"ignored": options.ignored},
     }
     return {
-        name: {key: text for key, text in table.items() if text is not None}
+        name: {key: one for key, one in table.items() if one not in (None, [], ())}
         for name, table in entries.items()
     }
 
@@ -148,8 +142,7 @@ def _format_names(names: Mapping[str, Sequence[str]]) -> list[str]:
     """The table `[names]`, pressures below it."""
     lines = ["", "[names]"]
     for role, some in names.items():
-        listed = ", ".join(map(format_text, some))
-        lines.append(f"{_format_path(role)} = [{listed}]")
+        lines.append(f"{_format_path(role)} = {format_value(list(some))}")
     return lines
 
 
@@ -164,10 +157,10 @@ def _format_spec(role: str, spec: ChannelSpec, draft: Draft) -> list[str]:
         lines += _format_unit_gap(draft.units[role], draft.accept, usual)
     return [
         *lines,
-        f"sign = {spec.sign}",
-        f"scale = {float(spec.scale)!r}",
-        f"offset = {float(spec.offset)!r}",
-        f"time_shift_s = {float(spec.time_shift)!r}",
+        format_entry("sign", spec.sign),
+        format_entry("scale", float(spec.scale)),
+        format_entry("offset", float(spec.offset)),
+        format_entry("time_shift_s", float(spec.time_shift)),
     ]
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterator
@@ -349,6 +348,7 @@ def _write_results(
     origin: tuple[Twin, Request],
 ) -> None:
     from drivetwin._util.atomic import write_text
+    from drivetwin._util.plain_values import format_json
     from drivetwin._util.version import get_program_version
     from drivetwin.cli.atomic_outputs import write_atomically
     from drivetwin.export.parameters.files import ParameterFormat, write_parameters
@@ -386,7 +386,7 @@ def _write_results(
             folder / CALIBRATION, build_calibration_file(found, provenance, front, mapped)
         )
         certificate = build_certificate_document(found)
-        write_text(folder / CERTIFICATE, json.dumps(certificate, indent=2, allow_nan=False) + "\n")
+        write_text(folder / CERTIFICATE, format_json(certificate))
         for kind in (ParameterFormat.CSV, ParameterFormat.DCM, ParameterFormat.CDFX):
             if template is not None:
                 require_labels(content, template, kind)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -121,10 +120,9 @@ def print_findings(findings: Iterable[Finding]) -> None:
 
 def print_json(value: Mapping[str, Any]) -> None:
     """Print one strict JSON document on stdout; NaN and infinities become null."""
-    from drivetwin._util.plain_values import to_plain_values
+    from drivetwin._util.plain_values import format_json
 
-    text = json.dumps(to_plain_values(dict(value)), allow_nan=False, ensure_ascii=False, indent=2)
-    sys.stdout.write(escape_json(text) + "\n")
+    sys.stdout.write(escape_json(format_json(dict(value))))
 
 
 @contextmanager

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import json
 from io import StringIO
 
 import numpy as np
 import tomlkit
 
 from drivetwin._util.csv_text import format_csv_row
+from drivetwin._util.plain_values import format_json
 from drivetwin.channels.roles import get_pressure_element
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR
@@ -56,7 +56,7 @@ def format_truth(run: DynoRun) -> str:
         "plant": "dual clutch" if run.scenario.plant is None else run.scenario.plant.name,
         "loss_law": run.scenario.model.loss_law,
     }
-    return json.dumps({**run.truth.as_dict(), "run": setup}, indent=2, ensure_ascii=False) + "\n"
+    return format_json({**run.truth.as_dict(), "run": setup})
 
 
 def format_card(scenario: Scenario) -> str:

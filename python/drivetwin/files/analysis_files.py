@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
 
-from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.plain_values import format_json
 from drivetwin.estimation.analysis.bootstrap import Bootstrap
 from drivetwin.estimation.analysis.friction_dependence import UNITS, Dependence
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
@@ -21,18 +19,18 @@ from drivetwin.fit.examine import REPEATS, Improvement
 def format_suggestions(found: tuple[ExperimentRanking, ...]) -> str:
     """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
     rows = [SuggestionRecord.from_result(one).model_dump(mode="json") for one in found]
-    return _format_json({"suggestions": rows})
+    return format_json({"suggestions": rows})
 
 
 def format_improvements(found: Sequence[Improvement], units: Mapping[str, str]) -> str:
     """`suggestions.json` of a fit: half widths of the intervals, and what would narrow them."""
     rows = [{**asdict(one), "repeats": REPEATS, "unit": units[one.unknown]} for one in found]
-    return _format_json({"suggestions": rows})
+    return format_json({"suggestions": rows})
 
 
 def format_profile(one: Profile, unit: str) -> str:
     """`profile.<parameter>.json`: rise of Q over the parameter, and both intervals."""
-    return _format_json(
+    return format_json(
         {
             "parameter": one.parameter,
             "unit": unit,
@@ -60,7 +58,7 @@ def format_bootstrap(one: Bootstrap, units: Mapping[str, str]) -> str:
         }
         for k, name in enumerate(one.ids)
     }
-    return _format_json({"seed": one.seed, "failed": one.failed, "parameters": parameters})
+    return format_json({"seed": one.seed, "failed": one.failed, "parameters": parameters})
 
 
 def format_friction(one: ShapedFriction) -> str:
@@ -69,9 +67,7 @@ def format_friction(one: ShapedFriction) -> str:
         name: FrictionRecord.from_result(curve).model_dump(mode="json")
         for name, curve in one.curves.items()
     }
-    return _format_json(
-        {"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves}
-    )
+    return format_json({"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves})
 
 
 def format_dependences(found: tuple[Dependence, ...]) -> str:
@@ -80,10 +76,4 @@ def format_dependences(found: tuple[Dependence, ...]) -> str:
     rows = [
         {name: getattr(one, name) for name in names} | {"unit": UNITS[one.kind]} for one in found
     ]
-    return _format_json({"dependences": rows})
-
-
-def _format_json(content: dict[str, Any]) -> str:
-    return (
-        json.dumps(to_plain_values(content), allow_nan=False, ensure_ascii=False, indent=2) + "\n"
-    )
+    return format_json({"dependences": rows})

@@ -8,10 +8,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import tomlkit
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.atomic import write_text
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.toml import parse_toml
 from drivetwin.calibration.calibrate import Calibration
@@ -23,7 +21,7 @@ from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.files.limits_file import build_limit_keys
-from drivetwin.files.records import Record, SchemaName, read_record
+from drivetwin.files.records import Record, SchemaName, read_record, write_toml
 
 
 class PointFigures(Record):
@@ -199,14 +197,8 @@ def build_calibration_file(
 
 def write_calibration_file(path: Path, content: CalibrationFile) -> None:
     """Write `calibration.toml`; it appears whole or not at all."""
-    document = tomlkit.document()
     place = f"Pressures are {content.policy.pressures}. Times count from the request of the gear."
-    for line in (_HEADER, place):
-        document.add(tomlkit.comment(line))
-    values = content.model_dump(mode="json", by_alias=True, exclude_none=True)
-    for key, value in values.items():
-        document.add(key, tomlkit.item(value))
-    write_text(path, tomlkit.dumps(document))
+    write_toml(path, (_HEADER, place), content)
 
 
 def read_calibration_file(path: Path) -> CalibrationFile:

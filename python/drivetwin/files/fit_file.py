@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.plain_values import format_json
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.records import (
@@ -122,5 +121,4 @@ def _build_fits(agreement: Mapping[str, Any]) -> dict[str, FitRecord]:
 
 def format_fit_file(file: FitFile) -> str:
     """Return the file as JSON text."""
-    content = to_plain_values(file.model_dump(mode="json", by_alias=True))
-    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=2) + "\n"
+    return format_json(file.model_dump(mode="json", by_alias=True))

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
+import tomlkit
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -23,6 +24,7 @@ from pydantic import (
 )
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.atomic import write_text
 from drivetwin._util.plain_values import convert_nonfinite
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin._util.toml import raise_faults, validate_schema
@@ -425,3 +427,22 @@ def _check_schema(found: object, known: str, file: str) -> None:
             "update drivetwin, or write the file again with this version",
             where,
         )
+
+
+def write_toml(path: Path | str, comments: Iterable[str], content: Record) -> None:
+    """Write a record as TOML below comments; the file appears whole or not at all."""
+    document = tomlkit.document()
+    for line in comments:
+        document.add(tomlkit.comment(line))
+    for key, value in _drop_null(content.model_dump(mode="json", by_alias=True)).items():
+        document.add(key, tomlkit.item(value))
+    write_text(path, tomlkit.dumps(document))
+
+
+def _drop_null(value: Any) -> Any:
+    """Drop null table entries, as TOML has no null; null in an array becomes NaN."""
+    if isinstance(value, dict):
+        return {k: _drop_null(item) for k, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [float("nan") if item is None else _drop_null(item) for item in value]
+    return value

@@ -11,7 +11,7 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.plain_values import format_json, to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification, LogPull, LogShare
 from drivetwin.estimation.result.cause import Group
@@ -198,8 +198,7 @@ class ResultFile(Record):
 
     def to_json(self) -> str:
         """Strict JSON text: no NaN, keys as in the published schema."""
-        tree = self.model_dump(mode="json", by_alias=True)
-        return json.dumps(tree, allow_nan=False, ensure_ascii=False, indent=2) + "\n"
+        return format_json(self.model_dump(mode="json", by_alias=True))
 
 
 _SAME_NAME = (

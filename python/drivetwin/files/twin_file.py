@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import tomlkit
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.toml import Fault, parse_toml, raise_faults
@@ -37,6 +35,7 @@ from drivetwin.files.records import (
     Record,
     SchemaName,
     read_record,
+    write_toml,
 )
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.added_elements import Converter
@@ -129,16 +128,6 @@ class TwinFile(Record):
     assumptions: list[str]
 
 
-def write_twin_file(path: Path | str, content: TwinFile) -> None:
-    """Write the records as TOML; the file appears whole or not at all."""
-    document = tomlkit.document()
-    for line in _HEADER:
-        document.add(tomlkit.comment(line))
-    for key, value in _drop_null(content.model_dump(mode="json", by_alias=True)).items():
-        document.add(key, tomlkit.item(value))
-    write_text(path, tomlkit.dumps(document))
-
-
 def read_twin_file(path: Path | str) -> TwinFile:
     """Read and check `twin.toml`.
 
@@ -153,15 +142,6 @@ def read_twin_file(path: Path | str) -> TwinFile:
         "correct these entries, or write the file again with 'drivetwin identify'",
     )
     return content
-
-
-def _drop_null(value: Any) -> Any:
-    """Drop null table entries, as TOML has no null; null in an array becomes NaN."""
-    if isinstance(value, dict):
-        return {k: _drop_null(item) for k, item in value.items() if item is not None}
-    if isinstance(value, list):
-        return [float("nan") if item is None else _drop_null(item) for item in value]
-    return value
 
 
 _ABOVE_ZERO = ("eta", "k_o")
@@ -249,7 +229,7 @@ def load_twin(path: Path | str) -> Twin:
 @check_arguments
 def save_twin(path: Path | str, twin: Twin) -> None:
     """Write `twin.toml` atomically."""
-    write_twin_file(path, build_twin_file(twin))
+    write_toml(path, _HEADER, build_twin_file(twin))
 
 
 def build_twin_file(twin: Twin) -> TwinFile:

@@ -14,8 +14,9 @@ from pydantic import Field, model_validator
 from drivetwin._util.toml import (
     Fault,
     StrictModel,
+    format_entry,
     format_key,
-    format_text,
+    list_stated,
     raise_faults,
     read_toml,
     validate_schema,
@@ -274,22 +275,22 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
 
     Raises InputError for an input that is neither a channel nor a constant.
     """
-    lines = ["[model]", f"name = {format_text(model.name)}"]
+    lines = ["[model]", format_entry("name", model.name)]
     for element in model.elements:
-        lines += ["", "[[elements]]", *(_format_entry(*item) for item in dict(element).items())]
+        lines += ["", "[[elements]]", *(format_entry(*item) for item in dict(element).items())]
     roles = channels.roles if channels else {}
     lines += _format_inputs(model, channels.inputs if channels else {}, roles)
     for name, output in model.outputs.items():
-        lines += ["", f"[outputs.{format_key(name)}]", _format_entry("quantity", list(output))]
+        lines += ["", f"[outputs.{format_key(name)}]", format_entry("quantity", list(output))]
         if channels is not None:
             lines += _format_spec(channels.outputs[name], roles.get(name))
             if name in channels.sigma:
-                lines.append(_format_entry("sigma", channels.sigma[name]))
+                lines.append(format_entry("sigma", channels.sigma[name]))
     start = model.start
-    lines += ["", "[start]", _format_entry("speeds", dict(start.speeds))]
-    lines.append(_format_entry("twists", dict(start.twists)))
-    lines.append(_format_entry("locked", list(start.locked)))
-    lines.append(_format_entry("known", list(channels.known) if channels else []))
+    lines += ["", "[start]", format_entry("speeds", dict(start.speeds))]
+    lines.append(format_entry("twists", dict(start.twists)))
+    lines.append(format_entry("locked", list(start.locked)))
+    lines.append(format_entry("known", list(channels.known) if channels else []))
     for name, one in model.unknowns.items():
         lines += ["", f"[unknowns.{format_key(name)}]", *_format_unknown(name, one)]
     if channels is not None and channels.run is not None:
@@ -307,58 +308,35 @@ def _format_inputs(
         if not isinstance(value, int | float):
             what = f"the input {name!r} is no constant, which a model file cannot state"
             raise InputError(what, "give the channel that records it")
-        lines += ["", f"[inputs.{format_key(name)}]", _format_entry("value", value)]
+        lines += ["", f"[inputs.{format_key(name)}]", format_entry("value", value)]
     for name, spec in recorded.items():
         lines += ["", f"[inputs.{format_key(name)}]", *_format_spec(spec, roles.get(name))]
     return lines
 
 
 def _format_unknown(name: str, one: Unknown) -> list[str]:
-    lines = [_format_entry("value", one.value)]
+    lines = [format_entry("value", one.value)]
     if one.std is not None:
-        lines.append(_format_entry("std", one.std))
+        lines.append(format_entry("std", one.std))
     low, high = one.bounds
     if low is not None or high is not None:
         ends = [-math.inf if low is None else low, math.inf if high is None else high]
-        lines.append(_format_entry("bounds", ends))
+        lines.append(format_entry("bounds", ends))
     if one.paths is not None:
-        lines.append(_format_entry("paths", one.get_factors(name)))
+        lines.append(format_entry("paths", one.get_factors(name)))
     return lines
 
 
 def _format_run(run: RunTable) -> list[str]:
-    lines = ["", "[run]", _format_entry("end_s", run.end_s), _format_entry("rate_Hz", run.rate_Hz)]
+    lines = ["", "[run]", format_entry("end_s", run.end_s), format_entry("rate_Hz", run.rate_Hz)]
     for name, one in run.inputs.items():
-        lines += ["", f"[run.inputs.{format_key(name)}]", _format_entry("points", one.points)]
-        lines.append(_format_entry("sigma", one.sigma))
+        lines += ["", f"[run.inputs.{format_key(name)}]", format_entry("points", one.points)]
+        lines.append(format_entry("sigma", one.sigma))
     return lines
 
 
 def _format_spec(spec: ChannelSpec, role: str | None) -> list[str]:
-    entries: dict[str, Any] = {"source": spec.source} if role is None else {"role": role}
-    usual = ChannelSpec(spec.source)
-    for key in ("group", "unit", "sign", "scale", "offset"):
-        if getattr(spec, key) != getattr(usual, key):
-            entries[key] = getattr(spec, key)
-    if spec.time_shift:
-        entries["time_shift_s"] = spec.time_shift
-    return [_format_entry(*item) for item in entries.items()]
-
-
-def _format_entry(key: str, value: Any) -> str:
-    return f"{format_key(key)} = {_format_value(value)}"
-
-
-def _format_value(value: Any) -> str:
-    if isinstance(value, str):
-        return format_text(value)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        inside = ", ".join(
-            f"{format_key(key)} = {_format_value(one)}" for key, one in value.items()
-        )
-        return f"{{{inside}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_format_value, value))}]"
-    return repr(value) if isinstance(value, int) else repr(float(value))
+    entries = list_stated(spec)
+    if role is not None:
+        entries = {"role": role} | {key: one for key, one in entries.items() if key != "source"}
+    return [format_entry(*item) for item in entries.items()]

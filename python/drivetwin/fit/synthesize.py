@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.plain_values import format_json
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.units import find_unit
@@ -101,7 +101,7 @@ def synthesize_log(
         columns[name] = columns[name] + spread * rng.standard_normal(count)
     return SynthesizedLog(
         _format_log(model, channels, time, columns),
-        json.dumps({"truth": _read_truth(model), "seed": seed}, indent=2) + "\n",
+        format_json({"truth": _read_truth(model), "seed": seed}),
         format_model(_guess(model), replace(channels, run=None, sigma={})),
     )
 

@@ -22,10 +22,8 @@ from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
-    FrictionTable,
-    ShiftElement,
-    Stribeck,
 )
+from drivetwin.twin.distribution import scale_friction
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
 from drivetwin.workbench.zoom import View, encode_curves
@@ -104,7 +102,7 @@ def build_model(twin: Twin, shift: Shift, changes: Mapping[str, float]) -> DualC
     }
     model = twin.build_dual_clutch(shift, overrides=overrides)
     elements = tuple(
-        _scale_friction(element, changes.get(FRICTION + element.name, 1.0))
+        scale_friction(element, changes.get(FRICTION + element.name, 1.0))
         for element in model.elements
     )
     return replace(model, elements=elements)
@@ -175,17 +173,6 @@ def _build_slider(twin: Twin, name: str) -> Slider | None:
     low, high = max(value - span, spec.lower), min(value + span, spec.upper)
     shown = (low * display.factor, value * display.factor, high * display.factor)
     return Slider.from_range(name, get_parameter_name(name), display.label, shown)
-
-
-def _scale_friction(element: ShiftElement, factor: float) -> ShiftElement:
-    law = element.friction
-    if isinstance(law, FrictionTable):
-        scaled = FrictionTable(law.slip, tuple(factor * mu for mu in law.mu))
-        return replace(element, friction=scaled)
-    return replace(
-        element,
-        friction=Stribeck(factor * law.mu_c, factor * law.mu_s, law.v_s, factor * law.mu_v),
-    )
 
 
 def _replace_values(twin: Twin, changes: Mapping[str, float]) -> Twin:
