@@ -25,8 +25,8 @@ from drivetwin.drive.schedule import Schedule
 from drivetwin.drive.shift_plan import CLOSE, FILL, MARGIN, OPEN, RAMP, compute_pressure
 from drivetwin.errors import CardError, InputError, SimulationError
 from drivetwin.gearbox import Gearbox
-from drivetwin.gearbox.spec import GROUND
 from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.element_schema import GROUND
 from drivetwin.simulation.network import Output
 from drivetwin.vehicle.shift_kind import ShiftKind
 

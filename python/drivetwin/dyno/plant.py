@@ -11,7 +11,6 @@ import numpy as np
 
 from drivetwin.gearbox import Gearbox, build_network_elements, reduce, solve_gear
 from drivetwin.gearbox.reduction import ElementRatios, build_shift_element
-from drivetwin.gearbox.spec import GROUND
 from drivetwin.simulation.driveline import (
     ENGINE,
     SHAFT,
@@ -31,6 +30,7 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Trajectory,
 )
+from drivetwin.simulation.element_schema import GROUND
 from drivetwin.simulation.network import Element, Start, build_element, simulate
 
 _MAIN = 2e6

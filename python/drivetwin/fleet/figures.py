@@ -13,10 +13,18 @@ from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, UnitValue
 from drivetwin.fleet.rules import format_reading, is_date, to_datetime
 from drivetwin.report.figure import Figure
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.style import ACCENT, FITTED, MEASURED, MUTED, SECOND, make_axis, make_layout
+from drivetwin.report.style import (
+    ACCENT,
+    BAND,
+    FITTED,
+    MEASURED,
+    MUTED,
+    SECOND,
+    make_axis,
+    make_layout,
+)
 
 _MOST_POINTS = 4000
-_BAND = "rgba(213,94,0,0.18)"
 
 
 def plot_drift(one: JointEstimate) -> Figure:
@@ -86,7 +94,7 @@ def _add_line(figure: Figure, one: JointEstimate, drift: Drift) -> None:
         x=np.concatenate((x, x[::-1])),
         y=display.to_display(np.concatenate((middle + half, (middle - half)[::-1]))),
         fill="toself",
-        fillcolor=_BAND,
+        fillcolor=BAND,
         line={"width": 0},
         name="95 % of the fleet's mean",
         hoverinfo="skip",

@@ -24,7 +24,6 @@ from drivetwin.channels.units import BAR
 from drivetwin.errors import CardError, suggest_spelling
 from drivetwin.gearbox.spec import (
     CONVERTER,
-    GROUND,
     POWER_SPLIT_REMEDY,
     Capacity,
     ConverterStage,
@@ -37,6 +36,7 @@ from drivetwin.gearbox.spec import (
     ShiftMember,
 )
 from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.simulation.element_schema import GROUND
 from drivetwin.vehicle.converter import ConverterTable
 
 Name = Annotated[str, Field(min_length=1)]

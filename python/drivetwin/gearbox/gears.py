@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from drivetwin._native import gear_statics as native_gear_statics
 from drivetwin.errors import InputError, NoFixedRatioError
 from drivetwin.gearbox.network import as_json
-from drivetwin.gearbox.spec import GROUND, POWER_SPLIT_REMEDY, Gearbox
+from drivetwin.gearbox.spec import POWER_SPLIT_REMEDY, Gearbox
+from drivetwin.simulation.element_schema import GROUND
 
 
 @dataclass(frozen=True)

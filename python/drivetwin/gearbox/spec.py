@@ -51,8 +51,6 @@ class Drive:
         )
 
 
-GROUND = "ground"
-"""The member that does not turn: the housing."""
 CONVERTER = "converter"
 """Name of the converter among the elements of the network."""
 POWER_SPLIT_REMEDY = (

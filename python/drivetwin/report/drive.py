@@ -17,11 +17,10 @@ from drivetwin.report.figure import Figure, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.html import render_page
 from drivetwin.report.style import (
-    ACCENT,
     COMPARED,
     MEASURED,
     MUTED,
-    SECOND,
+    SERIES,
     SIMULATED,
     make_axis,
     make_layout,
@@ -146,7 +145,6 @@ def _list_converter_columns(run: DriveRun) -> Mapping[tuple[str, str], FloatArra
     }
 
 
-_COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 _RATIO = Display("–")
 _BEFORE, _AFTER = 0.1, 0.6
 """Time before and after a shift in its figure, s."""
@@ -222,7 +220,7 @@ def _build_speed_curves(run: DriveRun, inside: slice) -> list[Curve]:
         Curve("engine", time, run.engine_speed[inside], MEASURED),
         *(
             Curve(name, time, values[inside], colour)
-            for (name, values), colour in zip(shafts.items(), cycle(_COLOURS[1:]), strict=False)
+            for (name, values), colour in zip(shafts.items(), cycle(SERIES[1:]), strict=False)
         ),
         Curve("gearbox output", time, run.output_speed[inside], COMPARED),
     ]
@@ -240,6 +238,6 @@ def _build_element_curves(
     values: Mapping[str, FloatArray], time: FloatArray, inside: slice, names: Iterable[str]
 ) -> list[Curve]:
     return [
-        Curve(name, time, values[name][inside], _COLOURS[index % len(_COLOURS)])
+        Curve(name, time, values[name][inside], SERIES[index % len(SERIES)])
         for index, name in enumerate(names)
     ]

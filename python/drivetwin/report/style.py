@@ -18,6 +18,10 @@ COMPARED = "#009E73"
 ACCENT = "#CC79A7"
 SECOND = "#E69F00"
 MUTED = "#8a8f98"
+SERIES = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
+"""Colours of curves of equal rank."""
+BAND = "rgba(213,94,0,0.18)"
+"""Filling of a 95 % band."""
 
 VERDICT_COLOURS = {
     Verdict.IDENTIFIED: "#009E73",

@@ -19,6 +19,7 @@ from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.simulation.serialize import format_value, is_number
 
 GROUND = "ground"
+"""The node or member that does not turn: the housing."""
 
 
 class FieldKind(StrEnum):

@@ -22,13 +22,13 @@ from drivetwin.export.modelica.component import (
     format_values,
 )
 from drivetwin.export.modelica.friction import (
-    GROUND,
     add_planetary_losses,
     build_bearing,
     build_clutch,
     build_loss_gear,
     build_one_way_clutch,
 )
+from drivetwin.simulation.element_schema import GROUND
 from drivetwin.simulation.network import Element
 
 _COMPONENTS = f"{ROTATIONAL}.Components"

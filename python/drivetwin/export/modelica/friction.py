@@ -30,6 +30,7 @@ from drivetwin.export.modelica.component import (
 )
 from drivetwin.export.parameters.content import format_number
 from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.simulation.element_schema import GROUND
 from drivetwin.simulation.network import Element
 
 
@@ -79,7 +80,6 @@ def _format_losses(losses: Mapping[str, Any]) -> tuple[str, str]:
     return "losses", format_matrix([(0.0, 0.0, *losses["speed"]), *rows])
 
 
-GROUND = "ground"
 _FULL_PRESSURE = 1e6
 """Pressure above the fill [Pa] that counts as f_normalized = 1; the product alone matters."""
 _POINTS, _DECAYS, _TAIL = 101, 10.0, 40.0

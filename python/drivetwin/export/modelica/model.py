@@ -28,7 +28,6 @@ from drivetwin.export.modelica.component import (
     read_helper,
 )
 from drivetwin.export.modelica.elements import build_part
-from drivetwin.export.modelica.friction import GROUND
 from drivetwin.export.modelica.inputs import (
     Inputs,
     format_equations,
@@ -39,7 +38,7 @@ from drivetwin.export.parameters.content import format_number
 from drivetwin.export.subject import Subject
 from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal
-from drivetwin.simulation.element_schema import list_ports
+from drivetwin.simulation.element_schema import GROUND, list_ports
 from drivetwin.simulation.network import Element, Start
 
 if TYPE_CHECKING:

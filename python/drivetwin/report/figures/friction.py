@@ -10,9 +10,7 @@ import numpy as np
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.report.figure import Entry, Figure, make_trace
 from drivetwin.report.figures.stack import MAX_POINTS
-from drivetwin.report.style import COMPARED, FITTED, MEASURED, make_axis, make_layout
-
-_BAND = "rgba(213,94,0,0.18)"
+from drivetwin.report.style import BAND, COMPARED, FITTED, MEASURED, make_axis, make_layout
 
 
 def plot_friction(element: str, curve: FrictionCurve) -> Figure:
@@ -27,7 +25,7 @@ def plot_friction(element: str, curve: FrictionCurve) -> Figure:
             name="points from the log",
             marker={"color": MEASURED, "size": 4, "opacity": 0.45},
         )
-    bounds = draw_band(curve, _BAND, name="95 % band, sensors and effects")
+    bounds = draw_band(curve, BAND, name="95 % band, sensors and effects")
     if len(bounds.x):
         figure.add_trace(bounds)
     figure.add_scatter(

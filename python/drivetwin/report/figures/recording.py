@@ -21,7 +21,7 @@ from drivetwin.report.figures.stack import (
     write_above,
 )
 from drivetwin.report.labels import get_channel_label
-from drivetwin.report.style import ACCENT, COMPARED, MEASURED, MUTED, SECOND, SIMULATED
+from drivetwin.report.style import ACCENT, COMPARED, MEASURED, SECOND, SERIES
 from drivetwin.shifts.shift import Shift
 
 QUANTITIES: dict[Quantity, tuple[str, Display]] = {
@@ -33,7 +33,6 @@ QUANTITIES: dict[Quantity, tuple[str, Display]] = {
     Quantity.STATE: ("state", Display("–")),
 }
 """Axis title and unit of each quantity."""
-_COLOURS = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 
 
 def plot_log(log: ShiftLog, shifts: Sequence[Shift] = ()) -> Figure:
@@ -73,7 +72,7 @@ def _build_curve(channel: Channel, k: int) -> Curve:
         get_channel_label(channel.role),
         channel.time,
         channel.values,
-        _COLOURS[k % len(_COLOURS)],
+        SERIES[k % len(SERIES)],
         step=held,
     )
 
