@@ -17,6 +17,7 @@ from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.export.parameters.json_file import CODEC
 from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.files.bus_file import BusFile, format_bus_file
 from drivetwin.files.fit_file import build_fit_file, format_fit_file
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, build_json_schema
@@ -64,6 +65,11 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
             yield json.loads(
                 format_fit_file(build_fit_file(fit_log(ModelName.TIP_IN), ["a.csv"], {}))
             )
+        case FileKind.BUS:
+            empty = BusFile(
+                version="1", logs=[], ratios={}, parameters={}, shifts=[], decays={}, findings=[]
+            )
+            yield json.loads(format_bus_file(empty))
         case _:
             yield from (tomllib.loads(text) for text in _toml(kind, folder))
 
@@ -83,6 +89,8 @@ def _toml(kind: FileKind, folder: Path) -> list[str]:
             page = fenced(REFERENCE / "model-file.md", "toml")
             made = [format_model(*read_builtin(name)) for name in ModelName]
             return [*toml_files(PACKAGE / "fit" / "examples"), *made, *page]
+        case FileKind.RATIO_CARD:
+            return fenced(ROOT / "docs" / "howto" / "bus-only.md", "toml")
         case FileKind.FLEET_RULES:
             return fenced(ROOT / "docs" / "howto" / "fleet.md", "toml")[:1]
         case _:

@@ -54,7 +54,7 @@ LONG = {
 }
 """Pages by name, with the commands that make the files which the page takes as given."""
 WITHOUT_COMMANDS = ("install.md", "read-the-report.md", "workbench.md")
-FRAGMENTS = ("many-runs.md", "notebook.md", "several-logs.md")
+FRAGMENTS = ("bus-only.md", "many-runs.md", "notebook.md", "several-logs.md")
 """Pages with code that uses names of the reader; the notebooks of the examples run it whole."""
 HOURS = ("calibrate.md", "own-controller.md")
 """Pages whose commands search for an hour; `tests/calibration` runs shorter ones."""

@@ -28,6 +28,8 @@ _MIN_DISTANCES = 4
 """Fewest distances that show a raster: more than its period, jitter and share of strays [count]."""
 _QUANTILES = (0.05, 0.1, 0.25, 0.5)
 """Distances that a search for the period begins with, as shares of all: some rows are hidden."""
+_PAUSE = 5.0
+"""Time between rows that is a pause of the record, as for gaps of a channel [periods]."""
 _ROUNDS = 20
 """Steps of such a search [count]: cost of work."""
 _LEAST_FILLED, _MOST_FILLED = 0.01, 0.9
@@ -224,8 +226,9 @@ def _weigh_corners(
         period = float(np.partition(apart, rank)[rank])
         if abs(period - best[1]) > 1e-3 * period:
             fit = _fit_raster(cells, apart, period, scaleless)
-            # If each row is a sample of the raster the record is not filled.
-            if fit[1] * (time.size - 1) > (1.0 + _LEAST_FILLED) * (time[-1] - time[0]):
+            # If each row is a sample of the raster the record is not filled. Pauses do not count.
+            recorded = float(np.sum(np.minimum(np.diff(time), _PAUSE * fit[1])))
+            if fit[1] * (time.size - 1) > (1.0 + _LEAST_FILLED) * recorded:
                 best = max(best, fit)
     if best[1] == 0.0:
         return None

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from drivetwin._util.request import flag, option, output_folder
-from drivetwin.cli.arguments import logs_argument
+from drivetwin._util.request import FileRole, Request, flag, input_file, option, output_folder
+from drivetwin.cli.arguments import logs_argument, mapping_option, method_option
 from drivetwin.cli.atomic_outputs import refuse_same_names
-from drivetwin.cli.identify_run import IdentifyOptions
+from drivetwin.cli.identify_run import IdentifyOptions, effects_option
 from drivetwin.cli.output import print_blocks, print_json, print_line, show_error, to_error_document
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.estimation.result.method import Method, ModelStatus
 
 if TYPE_CHECKING:
     from drivetwin.estimation.identification import Identification
@@ -26,10 +26,19 @@ NOT_CONFIRMED = 3
 """Exit code of a model that is neither valid nor valid with limits, with --strict."""
 
 
-class Identify(IdentifyOptions, command="identify"):
+class Identify(Request, command="identify"):
     """Arguments of `identify`."""
 
     logs: tuple[Path, ...] = logs_argument("One or more shift logs.")
+    vehicle: Path | None = input_file(
+        "Vehicle card, or a card of the ratios alone (TOML); without one, the ratios are taken "
+        "from the speeds of a bus log.",
+        "CARD",
+        FileRole.CARD,
+    )
+    channels: Path | None = mapping_option()
+    method: Method = method_option()
+    effects: tuple[str, ...] = effects_option()
     output: Path | None = output_folder("Folder for result, twin and report.")
     together: bool = flag("Fit all logs of one vehicle jointly.")
     hold_out: tuple[str, ...] = option(
@@ -37,7 +46,13 @@ class Identify(IdentifyOptions, command="identify"):
         metavar="SHIFT",
         default=(),
     )
+    bus: bool = flag("Use speeds, gear and engine torque alone, also with a whole vehicle card.")
     strict: bool = flag("Exit with code 3 unless every model is valid, limits included.")
+
+    @property
+    def options(self) -> IdentifyOptions:
+        """The options of the identification of a whole vehicle card."""
+        return IdentifyOptions(**self.select(IdentifyOptions))
 
 
 def identify(request: Identify, *, as_json: bool) -> None:
@@ -50,7 +65,14 @@ def identify(request: Identify, *, as_json: bool) -> None:
     With --together, one driveline is fitted to all logs; load and engine-torque delay are specific
     to each log. With --hold-out, which implies --together, a log or shift takes no part in the fit.
     It is simulated with the parameters of the others and compared.
+
+    Bus logs without pressures and output torque need a card of the ratios alone, or none: all logs
+    are then of one vehicle and identified as one, into DIR/bus.json and DIR/report.html. With
+    --hold-out, the decays of a LOG are predicted by the others.
     """
+    if _is_bus(request):
+        _identify_bus(request, as_json)
+        return
     if request.together or request.hold_out:
         _exit_by_status([_identify_joint(request, as_json)], request.strict)
         return
@@ -60,7 +82,7 @@ def identify(request: Identify, *, as_json: bool) -> None:
     failed: DrivetwinError | None = None
     for log in logs:
         try:
-            results.append(_identify_log(log, request, folders.get(log), as_json))
+            results.append(_identify_log(log, request.options, folders.get(log), as_json))
         except DrivetwinError as error:
             error.where = replace(error.where, file=error.where.file or str(log))
             if len(logs) == 1 or error.where.file in (str(request.vehicle), str(request.channels)):
@@ -74,6 +96,31 @@ def identify(request: Identify, *, as_json: bool) -> None:
     if failed is not None:
         raise typer.Exit(failed.exit_code)
     _exit_by_status([one["status"] for one in results], request.strict)
+
+
+def _is_bus(request: Identify) -> bool:
+    """Return True if speeds, gear and engine torque alone are to be used."""
+    from drivetwin.vehicle.ratio_card import is_ratio_card
+
+    return request.bus or request.vehicle is None or is_ratio_card(request.vehicle)
+
+
+def _identify_bus(request: Identify, as_json: bool) -> None:
+    """Identify bus logs of one vehicle, write and print the result."""
+    from drivetwin.cli.identify_bus import identify_bus_logs, write_bus
+
+    outcome = identify_bus_logs(
+        request.logs, request.vehicle, request.channels, request.hold_out, request.strict
+    )
+    settings = request.describe_settings()
+    files = () if request.output is None else write_bus(outcome, request.output, settings)
+    if as_json:
+        document = outcome.build_file(settings).model_dump(mode="json", by_alias=True)
+        print_json({**document, "files": [str(file) for file in files]})
+        return
+    print_blocks(outcome.build_blocks())
+    for file in files:
+        print_line(f"wrote {file}")
 
 
 def _exit_by_status(statuses: Sequence[str], strict: bool) -> None:
@@ -99,7 +146,7 @@ def _identify_joint(request: Identify, as_json: bool) -> ModelStatus:
     """Fit all logs as one and predict the held-out shifts; return the status of the model."""
     from drivetwin.cli.identify_joint import identify_logs, write_joint
 
-    outcome = identify_logs(request.logs, request, request.hold_out)
+    outcome = identify_logs(request.logs, request.options, request.hold_out)
     files = () if request.output is None else write_joint(outcome, request.output)
     if as_json:
         print_json(_to_document(outcome.found, files))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.progress import TimedStages
 from drivetwin._util.request import option
@@ -26,16 +26,21 @@ if TYPE_CHECKING:
 _READING = TimedStages("reading", ("log", "shifts", "card"))
 
 
-class IdentifyOptions(CardInput):
-    """Card, channel mapping and method of an identification, and priors of effects as typed."""
-
-    method: Method = method_option()
-    effects: tuple[str, ...] = option(
+def effects_option() -> Any:
+    """Declare the priors of effects."""
+    return option(
         "Prior of an effect that the model omits, such as tyre_slip=0.002; 0: no effect.",
         "--effect",
         metavar="NAME=STD",
         default=(),
     )
+
+
+class IdentifyOptions(CardInput):
+    """Card, channel mapping and method of an identification, and priors of effects as typed."""
+
+    method: Method = method_option()
+    effects: tuple[str, ...] = effects_option()
 
     def load_card(self) -> VehicleCard:
         """Read the card with the priors of effects."""

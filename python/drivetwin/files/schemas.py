@@ -31,6 +31,8 @@ class FileKind(StrEnum):
     ELEMENTS = "elements"
     MODEL = "model"
     FIT = "fit"
+    RATIO_CARD = "ratio-card"
+    BUS = "bus"
 
 
 _MODELS = {
@@ -43,6 +45,8 @@ _MODELS = {
     FileKind.TWIN: ("files.twin_file", "TwinFile"),
     FileKind.MODEL: ("fit.model_file", "NetworkFile"),
     FileKind.FIT: ("files.fit_file", "FitFile"),
+    FileKind.RATIO_CARD: ("vehicle.ratio_card", "RatioCardFile"),
+    FileKind.BUS: ("files.bus_file", "BusFile"),
     FileKind.PARAMETERS: ("export.parameters.json_file", "ParameterFile"),
 }
 """Module below the package, and the model there, by which the program itself checks the file; each

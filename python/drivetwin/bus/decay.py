@@ -1,0 +1,363 @@
+# SPDX-License-Identifier: MIT
+"""Resonance of the driveline in a gear, from the decays after all shifts into it together.
+
+A shaft speed after lock-up is
+
+    y = b0 + b1·t + e^(-σt)·(b2·cos ωt + b3·sin ωt) + e
+
+with one σ and ω for the gear, and b of each decay its own. The noise e (see `drift`) contains a
+drifting torque and a torque that drives the same oscillator: a forced vibration then informs on the
+frequency like a stationary one, and not like a clean decay. Amplitudes and trend are linear and
+drop out (separable least squares); σ and ω are searched for all decays at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.bus.drift import (
+    NoiseSize,
+    Swing,
+    build_covariance,
+    build_drift_kernel,
+    build_swing_kernel,
+    fit_noise,
+    regress,
+)
+from drivetwin.bus.recording import Signal
+from drivetwin.bus.scatter import Combined, ShiftValue, combine
+from drivetwin.bus.torque import compute_swing_response, integrate_torque
+from drivetwin.estimation.linear.ringdown import RING_DOWN
+from drivetwin.vehicle.spec import Z95
+
+
+@dataclass(frozen=True)
+class DecaySettings:
+    """Settings of the joint fit of decays."""
+
+    length: float = 2.0
+    """Longest fitted span after lock-up [s]; a driveline oscillation has decayed by then."""
+    min_length: float = 1.0
+    """Shortest fitted span [s]: a few periods of a truck in gear."""
+    min_periods: float = 2.0
+    """Periods of the lowest frequency in the shortest fitted span [count]."""
+    frequencies: int = 150
+    """Frequencies at which the search starts [count]."""
+    dampings: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2)
+    """Damping ratios at which the search starts [1]."""
+    least_damping: float = 1e-3
+    """Smallest damping ratio; no driveline is below [1]."""
+    rounds: int = 8
+    """Most alternations between noise and oscillator [count]."""
+    converged: float = 1e-3
+    """Step of an alternation at which the search ends [standard deviations]."""
+
+
+DECAY = DecaySettings()
+
+
+@dataclass(frozen=True, eq=False)
+class DecayRecord:
+    """Samples of one decay: `time` (n,) [s] from the first one, `values` (n,) [rad/s].
+
+    `label` names log and shift, `start` [s] is the first sample in the time of the log. `floor`
+    [rad/s] is the standard deviation of rounding. An engine `torque`, `late` [s], drives both the
+    trend and the oscillation where it is recorded.
+    """
+
+    label: str
+    start: float
+    time: FloatArray
+    values: FloatArray
+    floor: float
+    torque: Signal | None = None
+    late: float = 0.0
+
+    def build_columns(self, swing: Swing) -> FloatArray:
+        """Columns (n, 4) of trend and oscillation, two more of a torque."""
+        columns = build_columns(self.time, swing)
+        if self.torque is None:
+            return columns
+        impulse = integrate_torque(self.torque, self.start + self.time + self.late)
+        driven = compute_swing_response(self.start + self.time, self.torque, self.late, swing)
+        return np.column_stack([columns, impulse, driven])
+
+
+@dataclass(frozen=True, eq=False)
+class DecayFit:
+    """One decay with the common oscillator: noise sizes, `fitted` (n,) mean without noise."""
+
+    record: DecayRecord
+    size: NoiseSize
+    fitted: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class JointDecay:
+    """Oscillator of a gear: `combined` holds rate σ [1/s] and angular frequency ω [rad/s].
+
+    `chance` is the probability with which noise alone passes for such an oscillation.
+    """
+
+    combined: Combined
+    fits: tuple[DecayFit, ...]
+    chance: float
+
+    @property
+    def swing(self) -> Swing:
+        """The oscillator."""
+        return Swing(*map(float, self.combined.value))
+
+    def compute_frequency(self) -> tuple[float, float]:
+        """Damped frequency [Hz] and its standard deviation."""
+        return self.swing.omega / (2.0 * np.pi), float(self.combined.std[1]) / (2.0 * np.pi)
+
+    def compute_damping(self) -> tuple[float, float]:
+        """Damping ratio and its standard deviation."""
+        rate, omega = self.swing.rate, self.swing.omega
+        norm = float(np.hypot(rate, omega))
+        rate_std, omega_std = self.combined.std
+        std = float(np.hypot(omega**2 * rate_std, rate * omega * omega_std)) / norm**3
+        return rate / norm, std
+
+    def compute_square(self) -> tuple[float, float]:
+        """Square of the undamped angular frequency, σ² + ω² [1/s²], and its standard deviation."""
+        rate, omega = self.swing.rate, self.swing.omega
+        rate_std, omega_std = self.combined.std
+        std = 2.0 * float(np.hypot(rate * rate_std, omega * omega_std))
+        return rate**2 + omega**2, std
+
+
+def build_columns(time: FloatArray, swing: Swing) -> FloatArray:
+    """Columns (n, 4) of trend and oscillation."""
+    fall = np.exp(-swing.rate * time)
+    angle = swing.omega * time
+    return np.column_stack([np.ones_like(time), time, fall * np.cos(angle), fall * np.sin(angle)])
+
+
+def fit_decays(records: Sequence[DecayRecord], start: Swing | None = None) -> JointDecay | None:
+    """Fit one oscillator to all decays of a gear; None if it is not determined.
+
+    `start` is the oscillator that the search begins with, None to look for it.
+    """
+    swing = start or _find_start(records)
+    if swing is None:
+        return None
+    sizes = [_fit_size(one, swing, None) for one in records]
+    for turn in range(DECAY.rounds):
+        if turn:
+            sizes = [_fit_size(one, swing, size) for one, size in zip(records, sizes, strict=True)]
+        made = [_expand(one, swing, size) for one, size in zip(records, sizes, strict=True)]
+        slope = np.sum([one[0] for one in made], axis=0)
+        information = np.sum([one[1] for one in made], axis=0)
+        step = _limit_step(swing, slope, information)
+        if step is None:
+            return None
+        swing = _move(swing, step)
+        if float(step @ information @ step) < DECAY.converged**2:
+            break
+    return _finish(records, swing, sizes)
+
+
+def _finish(
+    records: Sequence[DecayRecord], swing: Swing, sizes: Sequence[NoiseSize]
+) -> JointDecay | None:
+    values = []
+    point = np.array([swing.rate, swing.omega])
+    for one, size in zip(records, sizes, strict=True):
+        slope, information = _expand(one, swing, size)
+        values.append(
+            ShiftValue(one.label, point + np.linalg.pinv(information) @ slope, information)
+        )
+    combined = combine(values)
+    if combined is None:
+        return None
+    found = Swing(max(float(combined.value[0]), 1e-9), float(combined.value[1]))
+    fits = tuple(
+        DecayFit(one, size, _compute_mean(one, found, size))
+        for one, size in zip(records, sizes, strict=True)
+    )
+    return JointDecay(combined, fits, _compute_chance(records, swing, sizes))
+
+
+def _fit_size(one: DecayRecord, swing: Swing, start: NoiseSize | None) -> NoiseSize:
+    return fit_noise(one.time, one.build_columns(swing), one.values, one.floor, swing, start)
+
+
+def _score(one: DecayRecord, swing: Swing, size: NoiseSize) -> float:
+    covariance = build_covariance(one.time, size, one.floor, swing)
+    made = regress(one.build_columns(swing), one.values, covariance)
+    return -np.inf if made is None else made.log_likelihood
+
+
+def _expand(one: DecayRecord, swing: Swing, size: NoiseSize) -> tuple[FloatArray, FloatArray]:
+    """Slope (2,) and information (2, 2) of the log likelihood by rate and angular frequency."""
+    step = np.array([0.02 * max(swing.rate, 0.02 * swing.omega), 2e-3 * swing.omega])
+    here = _score(one, swing, size)
+    ends = np.array(
+        [[_score(one, _move(swing, sign * step * e), size) for sign in (1, -1)] for e in np.eye(2)]
+    )
+    slope = (ends[:, 0] - ends[:, 1]) / (2.0 * step)
+    curve = np.diag((2.0 * here - ends.sum(axis=1)) / step**2)
+    both = [
+        a * b * _score(one, _move(swing, step * np.array([a, b])), size)
+        for a in (1, -1)
+        for b in (1, -1)
+    ]
+    curve[0, 1] = curve[1, 0] = -sum(both) / (4.0 * step[0] * step[1])
+    size_, axes = np.linalg.eigh(curve * np.outer(step, step))
+    kept = (axes * np.maximum(size_, 0.0)) @ axes.T / np.outer(step, step)
+    return slope, np.asarray(kept)
+
+
+def _move(swing: Swing, step: FloatArray) -> Swing:
+    omega = swing.omega + float(step[1])
+    return Swing(max(swing.rate + float(step[0]), DECAY.least_damping * omega), omega)
+
+
+def _limit_step(swing: Swing, slope: FloatArray, information: FloatArray) -> FloatArray | None:
+    """Newton step, at most a tenth of the frequency and half of the rate."""
+    size = np.linalg.eigvalsh(information)
+    if not size[0] > 1e-12 * size[1]:
+        return None
+    step = np.linalg.solve(information, slope)
+    largest = np.array([0.5 * max(swing.rate, 0.02 * swing.omega), 0.1 * swing.omega])
+    return np.asarray(step * min(1.0, float(np.min(largest / np.maximum(np.abs(step), 1e-30)))))
+
+
+def _find_start(records: Sequence[DecayRecord]) -> Swing | None:
+    """Oscillator that explains most of all decays by plain least squares."""
+    shortest = min(float(one.time[-1]) for one in records)
+    slowest = DECAY.min_periods / shortest
+    finest = max(float(np.median(np.diff(one.time))) for one in records)
+    fastest = min(RING_DOWN.band[1], RING_DOWN.max_nyquist_share * 0.5 / finest)
+    if not slowest < fastest:
+        return None
+    trials = [
+        Swing(damping * omega, omega)
+        for omega in 2.0 * np.pi * np.geomspace(slowest, fastest, DECAY.frequencies)
+        for damping in DECAY.dampings
+    ]
+    return min(trials, key=lambda swing: sum(_compute_log_rms(one, swing) for one in records))
+
+
+def _compute_log_rms(one: DecayRecord, swing: Swing) -> float:
+    """Negative log likelihood of a decay in white noise; a quadratic trend stands for a drift."""
+    columns = np.column_stack([build_columns(one.time, swing), one.time**2])
+    q, _ = np.linalg.qr(columns)
+    left = one.values - one.values.mean()
+    left = left - q @ (q.T @ left)
+    return 0.5 * one.time.size * float(np.log(left @ left + one.time.size * one.floor**2))
+
+
+def _compute_mean(one: DecayRecord, swing: Swing, size: NoiseSize) -> FloatArray:
+    columns = one.build_columns(swing)
+    made = regress(columns, one.values, build_covariance(one.time, size, one.floor, swing))
+    beta = np.zeros(columns.shape[1]) if made is None else made.beta
+    return np.asarray(columns @ beta)
+
+
+def _compute_chance(
+    records: Sequence[DecayRecord], swing: Swing, sizes: Sequence[NoiseSize]
+) -> float:
+    """Probability of the gain in likelihood over a drifting speed that does not oscillate.
+
+    The amplitudes of each decay are tested, and the frequencies searched count as trials.
+    """
+    gain = 0.0
+    for one, size in zip(records, sizes, strict=True):
+        still = np.delete(one.build_columns(swing), (2, 3), axis=1)
+        without = fit_noise(one.time, still, one.values, one.floor, None)
+        plain = _profile(one, still, without, None)
+        gain += _profile(one, one.build_columns(swing), size, swing) - plain
+    tested = 3 * len(records)
+    return float(min(1.0, DECAY.frequencies * chdtrc(tested, max(2.0 * gain, 0.0))))
+
+
+def _profile(one: DecayRecord, columns: FloatArray, size: NoiseSize, swing: Swing | None) -> float:
+    """Log likelihood at the best coefficients, comparable between sets of columns."""
+    covariance = build_covariance(one.time, size, one.floor, swing)
+    made = regress(columns, one.values, covariance)
+    if made is None:
+        return -np.inf
+    left = one.values - columns @ made.beta
+    square = left @ np.linalg.solve(covariance, left)
+    return -0.5 * float(np.linalg.slogdet(covariance)[1] + square)
+
+
+@dataclass(frozen=True, eq=False)
+class DecayPrediction:
+    """Prediction of a decay by the oscillator of other shifts.
+
+    The first `used` samples give its amplitude, phase and trend; `mean` (n,) and `std` (n,) [rad/s]
+    are those of a sample.
+    """
+
+    record: DecayRecord
+    used: int
+    mean: FloatArray
+    std: FloatArray
+
+    @property
+    def predicted(self) -> NDArray[np.intp]:
+        """Indices (m,) of the samples that took no part."""
+        return np.arange(self.used, self.record.time.size, dtype=np.intp)
+
+    @property
+    def share_inside(self) -> float:
+        """Share of the predicted samples inside the 95 % band."""
+        k = self.predicted
+        far = np.abs(self.record.values[k] - self.mean[k]) <= Z95 * self.std[k]
+        return float(np.mean(far))
+
+
+def predict_decay(joint: JointDecay, record: DecayRecord, periods: float = 1.0) -> DecayPrediction:
+    """Predict a decay that took no part in `joint` from its first `periods` of the oscillation.
+
+    The noise has the median sizes of the fitted decays. The band contains the noise, the state
+    estimated from the first samples, and the interval of the oscillator with the scatter.
+    """
+    swing = joint.swing
+    used = int(np.searchsorted(record.time, periods * 2.0 * np.pi / swing.omega))
+    used = min(max(used, 8), record.time.size)
+    size = _take_median([one.size for one in joint.fits])
+    mean, variance = _extrapolate(record, used, swing, size)
+    spread = joint.combined.covariance + np.diag(joint.combined.tau**2)
+    root = np.linalg.cholesky(spread + 1e-12 * np.diag(np.diag(spread)))
+    # Unscented: the mean depends on the frequency by more than its first derivative.
+    points = [_move(swing, sign * np.sqrt(2.0) * root[:, k]) for k in (0, 1) for sign in (1, -1)]
+    others = [_extrapolate(record, used, one, size)[0] for one in points]
+    variance = variance + np.mean([(one - mean) ** 2 for one in others], axis=0)
+    return DecayPrediction(record, used, mean, np.sqrt(variance))
+
+
+def _take_median(sizes: Sequence[NoiseSize]) -> NoiseSize:
+    rows = np.array([(one.white, one.drift, one.swing) for one in sizes])
+    return NoiseSize(*map(float, np.sqrt(np.median(rows**2, axis=0))))
+
+
+def _extrapolate(
+    record: DecayRecord, used: int, swing: Swing, size: NoiseSize
+) -> tuple[FloatArray, FloatArray]:
+    """Mean (n,) and variance (n,) of a sample, given the first `used` samples."""
+    time = record.time
+    columns = record.build_columns(swing)
+    whole = build_covariance(time, size, record.floor, swing)
+    drift = size.drift**2 * build_drift_kernel(time, time[:used])
+    across = drift + size.swing**2 * build_swing_kernel(time, time[:used], swing)
+    inverse = np.linalg.inv(whole[:used, :used])
+    weights = across @ inverse
+    first = columns[:used]
+    beta_covariance = np.linalg.inv(first.T @ inverse @ first)
+    beta = beta_covariance @ (first.T @ (inverse @ record.values[:used]))
+    mean = columns @ beta + weights @ (record.values[:used] - first @ beta)
+    left = columns - weights @ first
+    variance = np.diag(whole) - np.einsum("ij,ij->i", weights, across)
+    variance = variance + np.einsum("ij,jk,ik->i", left, beta_covariance, left)
+    return np.asarray(mean), np.asarray(np.maximum(variance, size.white**2 + record.floor**2))

@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: MIT
+"""What the bus logs of one vehicle determine, from all their shifts together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from drivetwin.bus.alignment import (
+    ALIGNMENT,
+    Alignment,
+    JoinedSpan,
+    estimate_alignment,
+    estimate_delay,
+    split_span,
+)
+from drivetwin.bus.decay import (
+    DECAY,
+    DecayPrediction,
+    DecayRecord,
+    JointDecay,
+    fit_decays,
+    predict_decay,
+)
+from drivetwin.bus.phases import BusShift, Timeline, estimate_ratios, find_timeline
+from drivetwin.bus.quantities import (
+    DAMPING,
+    DEAD_TIME,
+    DELAY,
+    FREQUENCY,
+    RATIO,
+    SQUARE,
+    make_estimate,
+    make_id,
+    refuse,
+)
+from drivetwin.bus.recording import BusLog, prepare_bus_log
+from drivetwin.bus.scatter import Combined, combine
+from drivetwin.bus.torque import TorqueBalance
+from drivetwin.bus.torque_estimates import estimate_torques
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import NoShiftError, Where
+from drivetwin.estimation.linear.ringdown import RING_DOWN
+from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.estimation.result.verdict import VERDICT
+from drivetwin.findings import Code, Finding, Number, explain, report
+from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.spec import Z95
+
+_BEYOND_METER = ("eta", "k_o", "c_o", "mu_gain", "P0")
+"""Quantities that only an output torque meter, or pressures, determine."""
+
+
+@dataclass(frozen=True, eq=False)
+class BusIdentification:
+    """Result for one vehicle.
+
+    `estimates` by id, `ratios` by gear as they were used. `decays` by gear hold the joint fits,
+    `predictions` those of decays that took no part, by label. `energies` are the slip energies [J]
+    of the closing clutch by shift, with standard deviation.
+    """
+
+    estimates: dict[str, Estimate]
+    ratios: dict[str, float]
+    timelines: tuple[Timeline, ...]
+    decays: dict[str, JointDecay]
+    predictions: dict[str, DecayPrediction]
+    balances: dict[str, TorqueBalance] = field(default_factory=dict)
+    energies: dict[str, tuple[float, float]] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def shifts(self) -> tuple[BusShift, ...]:
+        """Shifts of all logs."""
+        return tuple(shift for one in self.timelines for shift in one.shifts)
+
+
+def identify_bus(
+    logs: Sequence[ShiftLog], card: RatioCard | None = None, held_out: Sequence[ShiftLog] = ()
+) -> BusIdentification:
+    """Identify a vehicle from bus logs with input and output speed.
+
+    Parameters
+    ----------
+    logs : logs of one vehicle
+    card : ratios of the gears; None to take them from the speeds
+    held_out : logs whose decays are predicted by the others
+
+    Raises
+    ------
+    NoShiftError
+        If no gear is held for long enough.
+    """
+    bus = [prepare_bus_log(one, Path(one.source).name) for one in logs]
+    others = [prepare_bus_log(one, Path(one.source).name) for one in held_out]
+    ratios = estimate_ratios(bus) if card is None else _get_values(card)
+    late, aligned = _align(bus, ratios)
+    timelines = [find_timeline(one, ratios, late) for one in bus]
+    if not any(one.held for one in timelines):
+        raise NoShiftError(
+            "no gear is held for long enough to compare the speeds",
+            "check the ratios on the card, and the speeds with 'drivetwin inspect'",
+            Where(file=bus[0].source if bus else None),
+        )
+    made = _Maker(ratios, card)
+    made.add_alignment(aligned)
+    made.add_decays(_collect_decays(timelines))
+    torques = estimate_torques(timelines, ratios, late, made.decays, card)
+    dead = torques.estimates[DEAD_TIME].value
+    if dead is not None:  # the torque drives the oscillation of the decays too
+        made.add_decays(_collect_decays(timelines, dead))
+        torques = estimate_torques(timelines, ratios, late, made.decays, card)
+    made.report_decays()
+    made.estimates |= torques.estimates
+    made.findings += torques.findings
+    for name in _BEYOND_METER:
+        made.estimates[name] = refuse(name, "", explain(Code.BUS_NO_METER))
+    made.findings += [one for line in timelines for one in _find_limits(line)]
+    predictions: dict[str, DecayPrediction] = {}
+    for line in (find_timeline(one, ratios, late) for one in others):
+        for gear, each in _collect_decays([line], dead).items():
+            if gear in made.decays:
+                predictions |= {one.label: predict_decay(made.decays[gear], one) for one in each}
+    return BusIdentification(
+        made.estimates,
+        ratios,
+        tuple(timelines),
+        made.decays,
+        predictions,
+        torques.balances,
+        torques.energies,
+        tuple(made.findings),
+    )
+
+
+def _get_values(card: RatioCard) -> dict[str, float]:
+    return {gear: ratio.value for gear, ratio in card.ratios.items()}
+
+
+def _align(
+    logs: Sequence[BusLog], ratios: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, Alignment]]:
+    """Delays [s] of the speeds behind the input speed by role, and the estimates behind them."""
+    roles = ("output_speed", "engine_speed")
+    late: dict[str, float] = {}
+    lines = [find_timeline(one, ratios, late) for one in logs]
+    for role in roles:
+        first = estimate_delay(list(_list_joined(lines, role, ALIGNMENT.longest)))
+        late |= {} if first is None else {role: first}
+    # The gears held are known better with the delay of the output speed.
+    lines = [find_timeline(one, ratios, late) for one in logs]
+    aligned: dict[str, Alignment] = {}
+    for role in roles:
+        margin = abs(late.get(role, 0.0)) + ALIGNMENT.beside
+        found = estimate_alignment(list(_list_joined(lines, role, margin)))
+        combined = None if found is None else combine(found.delays)
+        late.pop(role, None)
+        if found is None or combined is None:
+            continue
+        aligned[role] = found
+        if Z95 * combined.std[0] < 4.0 * VERDICT.delay_identified:
+            late[role] = float(combined.value[0])
+    return late, aligned
+
+
+def _list_joined(lines: Sequence[Timeline], role: str, margin: float) -> Iterator[JoinedSpan]:
+    for line in lines:
+        signals = line.log.signals
+        inlet = signals["input_speed"]
+        other = signals.get(role)
+        if other is None or other is inlet:
+            continue
+        for held in line.held:
+            label = f"{line.log.label}, gear {held.gear}"
+            gear = held.gear if role == "output_speed" else ""
+            yield from split_span(label, gear, held.span, inlet, other, margin)
+
+
+def _collect_decays(
+    lines: Sequence[Timeline], dead: float | None = None
+) -> dict[str, list[DecayRecord]]:
+    """Samples of the input speed after each lock-up, by gear.
+
+    With the dead time [s] of the torque message they contain the torque, if it covers the decay.
+    """
+    records: dict[str, list[DecayRecord]] = {}
+    for line in lines:
+        inlet = line.log.signals["input_speed"]
+        for shift in line.shifts:
+            if shift.lockup is None:
+                continue
+            ends = [
+                one.span[1]
+                for one in line.held
+                if one.gear == shift.end_gear and one.span[0] <= shift.lockup < one.span[1]
+            ]
+            start = shift.lockup + RING_DOWN.latest_start
+            if not ends or ends[0] - start < DECAY.min_length:
+                continue
+            time, values = inlet.select((start, min(ends[0], start + DECAY.length)))
+            if time.size < RING_DOWN.min_samples:
+                continue
+            label = f"{line.log.label}, {shift.label}"
+            record = DecayRecord(label, float(time[0]), time - time[0], values, inlet.floor)
+            torque = line.log.signals.get("engine_torque")
+            if dead is not None and torque is not None:
+                span = (float(time[0]) + dead, float(time[-1]) + dead)
+                record = (
+                    replace(record, torque=torque, late=dead) if torque.covers(span) else record
+                )
+            records.setdefault(shift.end_gear, []).append(record)
+    return records
+
+
+def _find_limits(line: Timeline) -> Iterator[Finding]:
+    """Shifts of which the start or the end is not recorded."""
+    for shift in line.shifts:
+        label = f"{line.log.label}, {shift.label}"
+        if not shift.start_seen:
+            yield report(Code.BUS_START_NOT_SEEN, shift=label)
+        if shift.lockup is None:
+            yield report(Code.BUS_END_NOT_SEEN, shift=label)
+
+
+def find_contradictions(quantity: str, combined: Combined) -> Iterator[Finding]:
+    """Yield a finding for each shift that contradicts the others."""
+    for shift in combined.contradicting:
+        p = combined.p_values[shift]
+        yield report(Code.BUS_SHIFTS_CONTRADICT, shift=shift, quantity=quantity, p=p)
+
+
+class _Maker:
+    """Estimates and findings, added stage by stage."""
+
+    def __init__(self, ratios: Mapping[str, float], card: RatioCard | None) -> None:
+        self.ratios = ratios
+        self.card = card
+        self.estimates: dict[str, Estimate] = {}
+        self.decays: dict[str, JointDecay] = {}
+        self.refused: set[str] = set()
+        self.findings: list[Finding] = []
+
+    def add_alignment(self, aligned: Mapping[str, Alignment]) -> None:
+        """Add ratios and delays."""
+        if (found := aligned.get("output_speed")) is not None:
+            for gear in self.ratios:
+                self._add_ratio(gear, combine(found.ratios.get(gear, ())))
+        for role, one in aligned.items():
+            combined = combine(one.delays)
+            if combined is not None:
+                value, std = float(combined.value[0]), float(combined.std[0])
+                estimate = make_estimate(DELAY, role, value, std, combined)
+                self.estimates[estimate.id] = estimate
+                self.findings += find_contradictions(f"the delay of the {role}", combined)
+
+    def _add_ratio(self, gear: str, combined: Combined | None) -> None:
+        if combined is None:
+            return
+        value, std = float(combined.value[0]), float(combined.std[0])
+        one = make_estimate(RATIO, gear, value, std, combined)
+        self.estimates[one.id] = one
+        stated = None if self.card is None else self.card.ratios[gear]
+        if stated is not None and abs(value - stated.value) > Z95 * np.hypot(std, stated.std):
+            half = Number(Z95 * std)
+            self.findings.append(
+                report(Code.BUS_RATIO_DIFFERS, gear=gear, found=value, half=half, card=stated.value)
+            )
+
+    def add_decays(self, records: Mapping[str, Sequence[DecayRecord]]) -> None:
+        """Fit the decays of each gear."""
+        for gear in self.ratios:
+            if gear not in records:
+                continue
+            known = self.decays.get(gear)
+            joint = fit_decays(records[gear], None if known is None else known.swing)
+            if joint is not None and joint.chance < RING_DOWN.chance:
+                self.decays[gear] = joint
+            else:
+                self.refused.add(gear)
+
+    def report_decays(self) -> None:
+        """Add frequency, damping and stiffness over inertia of each gear with decays."""
+        for gear in self.ratios:
+            joint = self.decays.get(gear)
+            if joint is None:
+                reason = explain(Code.BUS_NO_DECAY)
+                for stem in (FREQUENCY, DAMPING, SQUARE) if gear in self.refused else ():
+                    self.estimates[make_id(stem, gear)] = refuse(stem, gear, reason)
+                continue
+            note = explain(Code.BUS_K_OVER_J)
+            for stem, (value, std), text in (
+                (FREQUENCY, joint.compute_frequency(), ""),
+                (DAMPING, joint.compute_damping(), ""),
+                (SQUARE, joint.compute_square(), note),
+            ):
+                one = make_estimate(stem, gear, value, std, joint.combined, text)
+                self.estimates[one.id] = one
+            self.findings += find_contradictions(f"the resonance in gear {gear}", joint.combined)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""Signals of a bus log as the estimators need them: samples, rounding, stretches without gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin.channels.shiftlog import Channel, ShiftLog, find_pauses
+from drivetwin.shifts.coverage import split_at_gaps
+from drivetwin.shifts.tcu_flags import find_flag_spans
+
+SPEEDS = ("input_speed", "output_speed", "engine_speed")
+"""Roles of speeds that are used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """Samples of a channel: `time` (n,) [s], `values` (n,) SI, `floor` standard deviation of
+    rounding."""
+
+    source: str
+    time: FloatArray
+    values: FloatArray
+    floor: float
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Central differences (n,) of the values over time."""
+        return np.asarray(np.gradient(self.values, self.time))
+
+    def interpolate(self, time: FloatArray) -> FloatArray:
+        """Values at `time` (m,), linear between the samples."""
+        return np.interp(time, self.time, self.values)
+
+    def interpolate_smoothly(self, time: FloatArray) -> FloatArray:
+        """Values at `time` (m,) of the cubics through the samples with their central differences.
+
+        A straight line lags behind a curve by an amount that a delay resembles.
+        """
+        place = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2)
+        step = self.time[place + 1] - self.time[place]
+        u = (time - self.time[place]) / step
+        first, last = self.values[place], self.values[place + 1]
+        bend = step * (self.slopes[place] * (1.0 - u) - self.slopes[place + 1] * u)
+        bend -= (last - first) * (1.0 - 2.0 * u)
+        return np.asarray(first + u * (last - first) + u * (1.0 - u) * bend)
+
+    def select(self, span: Span) -> tuple[FloatArray, FloatArray]:
+        """Time and values of the samples inside `span` [s]."""
+        keep = (self.time >= span[0]) & (self.time <= span[1])
+        return self.time[keep], self.values[keep]
+
+    def covers(self, span: Span) -> bool:
+        """Return True if the samples cover `span` [s] without a gap."""
+        if not self.time.size or span[0] < self.time[0] or span[1] > self.time[-1]:
+            return False
+        return split_at_gaps(span, find_pauses(self.time)) == (span,)
+
+
+@dataclass(frozen=True, eq=False)
+class BusLog:
+    """One bus log: `signals` by role, `gear` steps and `flags` (spans [s] of the shift flag).
+
+    `late` are the delays [s] of the speeds behind the input speed, by role; `stretches` [s] are the
+    parts in which both gearbox speeds are recorded without a gap.
+    """
+
+    label: str
+    signals: Mapping[str, Signal]
+    gear: Channel | None
+    flags: tuple[Span, ...] | None
+    stretches: tuple[Span, ...]
+    source: str = ""
+
+    def get_gear_value(self, time: float) -> str:
+        """Gear on the bus at `time` [s]; empty if it is not recorded."""
+        if self.gear is None:
+            return ""
+        known = self.gear.time <= time
+        place = int(np.count_nonzero(known)) - 1
+        value = self.gear.values[max(place, 0)]
+        return f"{value:g}" if np.isfinite(value) and value == round(value) else ""
+
+
+def prepare_bus_log(log: ShiftLog, label: str) -> BusLog:
+    """Prepare a log that has input and output speed."""
+    signals = {role: _prepare(log[role]) for role in (*SPEEDS, "engine_torque") if role in log}
+    if "input_speed" not in signals:
+        signals["input_speed"] = signals["engine_speed"]
+    flag = log.channels.get("shift_in_process")
+    both = [signals["input_speed"], signals["output_speed"]]
+    span = (max(float(one.time[0]) for one in both), min(float(one.time[-1]) for one in both))
+    gaps = tuple(gap for one in both for gap in find_pauses(one.time))
+    return BusLog(
+        label,
+        signals,
+        log.channels.get("gear"),
+        None if flag is None else find_flag_spans(flag),
+        tuple(split_at_gaps(span, gaps)) if span[1] > span[0] else (),
+        log.source,
+    )
+
+
+def _prepare(channel: Channel) -> Signal:
+    updates = channel.updates
+    finite = np.isfinite(updates.values)
+    values = updates.values[finite]
+    step = float(estimate_rounding_step(values))
+    return Signal(channel.source_name, updates.time[finite], values, step / float(np.sqrt(12.0)))

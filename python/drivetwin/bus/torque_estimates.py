@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: MIT
+"""Inertias, mass, dead time and slip energy of a vehicle, as far as its logs determine them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.bus.decay import JointDecay
+from drivetwin.bus.phases import PhaseName, Timeline
+from drivetwin.bus.quantities import (
+    DEAD_TIME,
+    ENGINE,
+    MASS,
+    TOTAL,
+    VEHICLE,
+    make_estimate,
+    make_id,
+    refuse,
+)
+from drivetwin.bus.scatter import ShiftValue
+from drivetwin.bus.torque import (
+    TORQUE,
+    ClosingClutch,
+    TorqueBalance,
+    TorqueSpan,
+    balance_held,
+    balance_open,
+    select_held,
+    select_open,
+)
+from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.findings import Code, Finding, Number, explain
+from drivetwin.vehicle.ratio_card import RatioCard
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueResults:
+    """Estimates by id; `balances` by gear, the open clutch under an empty name; slip energies [J]
+    with standard deviation by shift."""
+
+    estimates: dict[str, Estimate] = field(default_factory=dict)
+    balances: dict[str, TorqueBalance] = field(default_factory=dict)
+    energies: dict[str, tuple[float, float]] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+
+_ALL = (ENGINE, VEHICLE, MASS, DEAD_TIME)
+
+
+def estimate_torques(
+    lines: Sequence[Timeline],
+    ratios: Mapping[str, float],
+    late: Mapping[str, float],
+    decays: Mapping[str, JointDecay],
+    card: RatioCard | None,
+) -> TorqueResults:
+    """Estimate all that the engine torque determines; without one, each has its reason."""
+    if not any("engine_torque" in line.log.signals for line in lines):
+        reason = explain(Code.BUS_NO_TORQUE)
+        return TorqueResults({make_id(one): refuse(one, "", reason) for one in _ALL})
+    estimates: dict[str, Estimate] = {}
+    balances: dict[str, TorqueBalance] = {}
+    open_spans = _list_open(lines, late.get("engine_speed", 0.0))
+    alone = balance_open(open_spans)
+    reason = _explain_engine(alone, open_spans)
+    if alone is not None and not reason:
+        balances[""] = alone
+        _add(estimates, make_estimate(ENGINE, "", *alone.compute_inertia(), alone.combined))
+    else:
+        _add(estimates, refuse(ENGINE, "", reason))
+        alone = None
+    dead = None if alone is None else alone.compute_dead_time()[0]
+    for gear, spans in _list_held(lines, ratios, decays).items():
+        found = balance_held(spans, dead)
+        if found is not None:
+            balances[gear] = found
+            _add(estimates, make_estimate(TOTAL, gear, *found.compute_inertia(), found.combined))
+    _add_vehicle(estimates, balances, ratios, card)
+    _add_dead_time(estimates, balances)
+    energies = {} if alone is None else _list_energies(lines, late, alone, estimates)
+    return TorqueResults(estimates, balances, energies)
+
+
+def _add(estimates: dict[str, Estimate], one: Estimate) -> None:
+    estimates[one.id] = one
+
+
+def _list_open(lines: Sequence[Timeline], late: float) -> list[TorqueSpan]:
+    """Spans in which the engine turns alone: neutral with an open clutch."""
+    found = []
+    for line in lines:
+        engine, torque = (line.log.signals.get(one) for one in ("engine_speed", "engine_torque"))
+        if engine is None or torque is None or engine is line.log.signals["input_speed"]:
+            continue
+        for shift in line.shifts:
+            neutral = shift.find_phase(PhaseName.NEUTRAL)
+            if neutral is None:
+                continue
+            label = f"{line.log.label}, {shift.label}"
+            one = select_open(label, neutral, engine, late, torque)
+            found += [] if one is None else [one]
+    return found
+
+
+def _explain_engine(alone: TorqueBalance | None, spans: Sequence[TorqueSpan]) -> str:
+    """Return why the inertia of the engine is not determined; empty if it is."""
+    if not spans:
+        return explain(Code.BUS_NO_CLUTCH)
+    if alone is None:
+        return explain(Code.BUS_ENGINE_UNEXPLAINED)
+    J, offset = alone.compute_inertia()[0], -float(alone.combined.value[2])
+    largest = max(float(np.max(np.abs(one.torque.values))) for one in spans)
+    if abs(offset * J) > 4.0 * TORQUE.zero * largest:
+        return explain(Code.BUS_CLUTCH_CARRIES, offset=Number(offset * J, "N*m"))
+    return ""
+
+
+def _list_held(
+    lines: Sequence[Timeline], ratios: Mapping[str, float], decays: Mapping[str, JointDecay]
+) -> dict[str, list[TorqueSpan]]:
+    """Parts of gears held with a torque, by gear; the oscillator of the gear must be known."""
+    found: dict[str, list[TorqueSpan]] = {}
+    for line in lines:
+        torque = line.log.signals.get("engine_torque")
+        for held in line.held if torque is not None else ():
+            if held.gear not in decays or torque is None:
+                continue
+            label = f"{line.log.label}, gear {held.gear} from {held.span[0]:.2f} s"
+            inlet, swing = line.log.signals["input_speed"], decays[held.gear].swing
+            spans = select_held(
+                label, held.gear, held.span, inlet, ratios[held.gear], swing, torque
+            )
+            found.setdefault(held.gear, []).extend(spans)
+    return {gear: spans for gear, spans in found.items() if spans}
+
+
+def _add_vehicle(
+    estimates: dict[str, Estimate],
+    balances: Mapping[str, TorqueBalance],
+    ratios: Mapping[str, float],
+    card: RatioCard | None,
+) -> None:
+    """Add J_v/η from J_g = J_v/η + i²·J_e over the gears, with J_e of the open clutch."""
+    values = []
+    for gear, one in balances.items():
+        row = np.array([0.0, 1.0]) if not gear else np.array([1.0, ratios[gear] ** 2])
+        inertia, std = one.compute_inertia()
+        weight = np.outer(row, row) / std**2
+        point = row * inertia / float(row @ row)
+        values.append(ShiftValue(f"gear {gear}" if gear else "open clutch", point, weight))
+    found = combine_fixed(values)
+    gears = [one.combined.count for gear, one in balances.items() if gear]
+    if found is None or not gears:
+        reason = explain(Code.BUS_NO_SPAN, least=Number(TORQUE.min_held, "s"))
+        for stem in (VEHICLE, MASS):
+            _add(estimates, refuse(stem, "", reason))
+        return
+    best = max((one for gear, one in balances.items() if gear), key=lambda one: one.combined.count)
+    value, std = float(found[0][0]), float(np.sqrt(found[1][0, 0]))
+    _add(estimates, make_estimate(VEHICLE, "", value, std, best.combined))
+    if card is None or card.final_drive is None or card.wheel_radius is None:
+        _add(estimates, refuse(MASS, "", explain(Code.BUS_NO_RADIUS)))
+        return
+    factor = (card.final_drive.value / card.wheel_radius) ** 2
+    _add(estimates, make_estimate(MASS, "", factor * value, factor * std, best.combined))
+
+
+def combine_fixed(
+    values: Sequence[ShiftValue],
+) -> tuple[FloatArray, FloatArray] | None:
+    """Weighted least squares without scatter: mean (p,) and covariance (p, p); None if singular.
+
+    Intervals of the gears hold the scatter already. A misfit between them widens the result.
+    """
+    if not values:
+        return None
+    total = sum((one.information for one in values), np.zeros_like(values[0].information))
+    size = np.linalg.eigvalsh(total)
+    if size[0] <= 1e-12 * size[-1]:
+        return None
+    covariance = np.linalg.inv(total)
+    pulled = [one.information @ one.value for one in values]
+    mean = covariance @ np.sum(pulled, axis=0)
+    square = sum(float((one.value - mean) @ one.information @ (one.value - mean)) for one in values)
+    freedom = len(values) - mean.size
+    widening = max(1.0, square / freedom if freedom > 0 else 1.0)
+    return np.asarray(mean), np.asarray(covariance * widening)
+
+
+def _add_dead_time(estimates: dict[str, Estimate], balances: Mapping[str, TorqueBalance]) -> None:
+    """Add the dead time of the torque message, from all gears and the open clutch."""
+    values = []
+    for gear, one in balances.items():
+        dead, std = one.compute_dead_time()
+        values.append(ShiftValue(gear or "open clutch", np.array([dead]), np.array([[std**-2]])))
+    found = combine_fixed(values)
+    if found is None:
+        _add(estimates, refuse(DEAD_TIME, "", explain(Code.BUS_NO_CLUTCH)))
+        return
+    most = max((one.combined for one in balances.values()), key=lambda one: one.count)
+    value, std = float(found[0][0]), float(np.sqrt(found[1][0, 0]))
+    _add(estimates, make_estimate(DEAD_TIME, "", value, std, most))
+
+
+def _list_energies(
+    lines: Sequence[Timeline],
+    late: Mapping[str, float],
+    alone: TorqueBalance,
+    estimates: Mapping[str, Estimate],
+) -> dict[str, tuple[float, float]]:
+    """Slip energy of each closing clutch; its deviation is that of inertia and dead time."""
+    (J, J_std), dead = alone.compute_inertia(), estimates[DEAD_TIME]
+    if dead.value is None:
+        return {}
+    found = {}
+    for line in lines:
+        signals = line.log.signals
+        if not {"engine_speed", "engine_torque"} <= signals.keys():
+            continue
+        three = (signals[one] for one in ("engine_speed", "input_speed", "engine_torque"))
+        engine, inlet, torque = three
+        for shift in line.shifts:
+            span = shift.find_phase(PhaseName.CLUTCH_CLOSES)
+            if span is None or shift.find_phase(PhaseName.NEUTRAL) is None:
+                continue
+            one = ClosingClutch(engine, inlet, torque, late.get("engine_speed", 0.0), span)
+            here = one.compute_slip_energy(dead.value, J)
+            by_inertia = one.compute_slip_energy(dead.value, J + J_std) - here
+            later = dead.value + (dead.std_total or 0.0)
+            by_time = one.compute_slip_energy(later, J) - here
+            found[f"{line.log.label}, {shift.label}"] = here, float(np.hypot(by_inertia, by_time))
+    return found

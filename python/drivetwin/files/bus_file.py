@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""`bus.json`: what the bus logs of one vehicle determine, for machines."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import Field, FiniteFloat
+
+from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.version import get_program_version
+from drivetwin.bus.identify import BusIdentification
+from drivetwin.bus.phases import BusShift
+from drivetwin.files.records import (
+    FindingRecord,
+    Interval,
+    OptionalFloat,
+    ParameterRecord,
+    Record,
+    SchemaName,
+)
+from drivetwin.findings import Finding
+
+BUS_SCHEMA = "drivetwin/bus-1"
+
+
+class BusPhaseRecord(Record):
+    """Phase of a shift with its span [s]."""
+
+    name: str
+    span: Interval
+
+
+class BusShiftRecord(Record):
+    """Shift of a log; `lockup` [s] is None where the record ends before it."""
+
+    log: str
+    start_gear: str
+    end_gear: str
+    start_seen: bool
+    lockup: OptionalFloat
+    phases: list[BusPhaseRecord]
+
+
+class BusDecayRecord(Record):
+    """Decays of a gear behind its resonance.
+
+    `scatter` is the standard deviation between shifts of rate [1/s] and angular frequency [rad/s],
+    `p_value` the probability that all decays agree by noise alone, `p_values` that each agrees with
+    the others.
+    """
+
+    shifts: list[str]
+    scatter: tuple[FiniteFloat, FiniteFloat]
+    p_value: FiniteFloat
+    p_values: dict[str, FiniteFloat]
+
+
+class BusPredictionRecord(Record):
+    """Decay that took no part: share of its predicted samples inside the 95 % band."""
+
+    shift: str
+    samples: int
+    inside: FiniteFloat
+
+
+class BusEnergyRecord(Record):
+    """Slip energy [J] of a closing clutch, with standard deviation."""
+
+    shift: str
+    energy: FiniteFloat
+    std: FiniteFloat
+
+
+class BusFile(Record):
+    """Result of bus logs, SI. `parameters` by id, `ratios` by gear as they were used."""
+
+    schema_name: SchemaName = BUS_SCHEMA
+    version: str
+    logs: list[str]
+    ratios: dict[str, FiniteFloat]
+    parameters: dict[str, ParameterRecord]
+    shifts: list[BusShiftRecord]
+    decays: dict[str, BusDecayRecord]
+    predictions: list[BusPredictionRecord] = Field(default_factory=list)
+    energies: list[BusEnergyRecord] = Field(default_factory=list)
+    settings: dict[str, str] = Field(default_factory=dict)
+    findings: list[FindingRecord]
+
+
+def build_bus_file(
+    found: BusIdentification,
+    logs: Sequence[str],
+    remarks: Sequence[Finding] = (),
+    settings: Mapping[str, str] | None = None,
+) -> BusFile:
+    """Build the file of a result, with `remarks` of the reader and the options of the command."""
+    return BusFile(
+        version=get_program_version(),
+        logs=list(logs),
+        ratios=found.ratios,
+        parameters={
+            name: ParameterRecord.from_result(one) for name, one in found.estimates.items()
+        },
+        shifts=[
+            _build_shift(line.log.label, shift) for line in found.timelines for shift in line.shifts
+        ],
+        decays={
+            gear: BusDecayRecord(
+                shifts=[fit.record.label for fit in one.fits],
+                scatter=(float(one.combined.tau[0]), float(one.combined.tau[1])),
+                p_value=one.combined.p_value,
+                p_values=one.combined.p_values,
+            )
+            for gear, one in found.decays.items()
+        },
+        predictions=[
+            BusPredictionRecord(shift=name, samples=one.predicted.size, inside=one.share_inside)
+            for name, one in found.predictions.items()
+        ],
+        energies=[
+            BusEnergyRecord(shift=name, energy=value, std=std)
+            for name, (value, std) in found.energies.items()
+        ],
+        settings=dict(settings or {}),
+        findings=[FindingRecord.from_result(one) for one in (*remarks, *found.findings)],
+    )
+
+
+def _build_shift(log: str, shift: BusShift) -> BusShiftRecord:
+    phases = [BusPhaseRecord(name=name.value, span=span) for name, span in shift.phases]
+    return BusShiftRecord(
+        log=log,
+        start_gear=shift.start_gear,
+        end_gear=shift.end_gear,
+        start_seen=shift.start_seen,
+        lockup=shift.lockup,
+        phases=phases,
+    )
+
+
+def format_bus_file(file: BusFile) -> str:
+    """Return the file as JSON text."""
+    content: dict[str, Any] = to_plain_values(file.model_dump(mode="json", by_alias=True))
+    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=2) + "\n"

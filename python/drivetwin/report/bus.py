@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""Result of bus logs as blocks: for page, terminal and notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from drivetwin._util.display_units import RPM, format_uncertainty
+from drivetwin.bus.decay import DecayPrediction, JointDecay
+from drivetwin.bus.identify import BusIdentification
+from drivetwin.bus.phases import Timeline
+from drivetwin.estimation.result.estimate import Z95, Verdict
+from drivetwin.findings import Finding
+from drivetwin.report.blocks import (
+    Block,
+    FigureBlock,
+    Section,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    make_table,
+)
+from drivetwin.report.figure import Figure
+from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
+from drivetwin.report.html import render_page
+from drivetwin.report.sections.findings import build_findings_section
+from drivetwin.report.sections.parameters import build_parameter_blocks
+from drivetwin.report.style import MEASURED, SIMULATED
+
+_HEIGHT = 130
+"""Height of a panel [px]."""
+_BAND = "rgba(213,94,0,0.18)"
+"""Colour of a 95 % band."""
+_SHOWN = 8
+"""Decays of a gear in a figure [count]."""
+
+
+def render_bus(
+    found: BusIdentification, logs: Sequence[str], remarks: Sequence[Finding] = ()
+) -> str:
+    """HTML text of the page; equal results give equal text."""
+    sections = [
+        Section("result", "Result", "", [_build_tiles(found), *_build_parameters(found)]),
+        build_findings_section((*remarks, *found.findings)),
+        Section(
+            "shifts",
+            "Shifts",
+            "Phases from the ratio of the speeds and the slip of the clutch, where it is recorded.",
+            [build_phase_table(found.timelines), *_build_energies(found)],
+        ),
+        Section(
+            "decays",
+            "Decays after lock-up",
+            "Input speed of each decay, and the oscillation with the common frequency and damping.",
+            [*_build_decays(found), *_build_decay_tables(found)],
+        ),
+        Section(
+            "predictions",
+            "Held-out decays",
+            "The first period gives amplitude, phase and trend; all later samples are predicted.",
+            [*_build_predictions(found), *_build_prediction_table(found)],
+        ),
+    ]
+    title = f"Bus logs: {', '.join(logs)}"
+    subtitle = f"{len(logs)} logs · {len(found.shifts)} shifts"
+    return render_page(title, subtitle, [one for one in sections if one.blocks])
+
+
+def build_bus_blocks(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Block]:
+    """Quantities, shifts with phases, agreement of the decays, predictions, and findings."""
+    return [
+        *_build_parameters(found),
+        build_phase_table(found.timelines),
+        *_build_energies(found),
+        *_build_decay_tables(found),
+        *_build_prediction_table(found),
+        *build_findings_section((*remarks, *found.findings)).blocks,
+    ]
+
+
+def _build_tiles(found: BusIdentification) -> TilesBlock:
+    identified = [one for one in found.estimates.values() if one.verdict is Verdict.IDENTIFIED]
+    decays = sum(len(one.fits) for one in found.decays.values())
+    tiles = [
+        Tile("shifts", str(len(found.shifts))),
+        Tile("decays", str(decays), note=f"in {len(found.decays)} gears"),
+        Tile("identified", str(len(identified)), note=f"of {len(found.estimates)} quantities"),
+    ]
+    return TilesBlock(tiles)
+
+
+def _build_parameters(found: BusIdentification) -> list[Block]:
+    caption = "Quantities of all shifts together. Intervals contain the scatter between shifts."
+    return build_parameter_blocks(found.estimates, caption)
+
+
+def build_phase_table(timelines: Sequence[Timeline]) -> TableBlock:
+    """Phases of all shifts, with begin and length."""
+    rows = []
+    for line in timelines:
+        for shift in line.shifts:
+            name = f"{line.log.label}, {shift.label}"
+            start = shift.phases[0][1][0]
+            for phase, (low, high) in shift.phases:
+                rows.append((name, phase.value, low, low - start, high - low))
+                name = ""
+    columns = ("shift", "phase", ("at s", ".2f"), ("from begin s", ".2f"), ("length s", ".2f"))
+    return make_table("Shifts and their phases", columns, rows)
+
+
+def _build_energies(found: BusIdentification) -> Iterator[Block]:
+    if not found.energies:
+        return
+    rows = []
+    for shift, (energy, std) in found.energies.items():
+        value, half = format_uncertainty(energy * 1e-3, Z95 * std * 1e-3)
+        rows.append((shift, value, half))
+    columns = ("shift", ("slip energy kJ", "s"), ("± 95 %", "s"))
+    yield make_table("Slip energy of the closing clutch, from engine torque", columns, rows)
+
+
+def _build_decay_tables(found: BusIdentification) -> Iterator[Block]:
+    for gear, joint in found.decays.items():
+        combined = joint.combined
+        rows = [(name, p) for name, p in combined.p_values.items()]
+        if rows:
+            caption = (
+                f"Gear {gear}: agreement of each decay with the others by noise alone; "
+                f"all together p = {combined.p_value:.2g}"
+            )
+            yield make_table(caption, ("decay", ("p", ".2g")), rows)
+
+
+def _build_decays(found: BusIdentification) -> Iterator[Block]:
+    for gear, joint in found.decays.items():
+        yield FigureBlock(_plot_decays(joint), f"Decays in gear {gear}, the first {_SHOWN}.")
+
+
+def _plot_decays(joint: JointDecay) -> Figure:
+    panels = [
+        Panel(
+            fit.record.label,
+            RPM,
+            [
+                Curve("measured", fit.record.time, fit.record.values, MEASURED),
+                Curve("fitted", fit.record.time, fit.fitted, SIMULATED),
+            ],
+        )
+        for fit in joint.fits[:_SHOWN]
+    ]
+    end = max(float(fit.record.time[-1]) for fit in joint.fits[:_SHOWN])
+    return plot_over_time_axis(panels, (0.0, end), _HEIGHT * len(panels) + 60)
+
+
+def _build_predictions(found: BusIdentification) -> Iterator[Block]:
+    shown = list(found.predictions.values())[:_SHOWN]
+    if not shown:
+        return
+    end = max(float(one.record.time[-1]) for one in shown)
+    panels = [_build_prediction_panel(one) for one in shown]
+    figure = plot_over_time_axis(panels, (0.0, end), _HEIGHT * len(panels) + 60)
+    yield FigureBlock(figure, "Decays that took no part, with the 95 % band of the prediction.")
+
+
+def _build_prediction_panel(one: DecayPrediction) -> Panel:
+    time, k = one.record.time, one.predicted
+    half = Z95 * one.std[k]
+    curves = [
+        Curve("95 % band", time[k], one.mean[k] - half, _BAND, width=0.5, listed=False),
+        Curve("95 % band", time[k], one.mean[k] + half, _BAND, width=0.5, fill=_BAND),
+        Curve("measured", time, one.record.values, MEASURED),
+        Curve("predicted", time[k], one.mean[k], SIMULATED),
+    ]
+    return Panel(one.record.label, RPM, curves)
+
+
+def _build_prediction_table(found: BusIdentification) -> Iterator[Block]:
+    if not found.predictions:
+        return
+    rows = [
+        (
+            name,
+            one.predicted.size,
+            100.0 * one.share_inside,
+            float(np.median(Z95 * one.std[one.predicted])) * RPM.factor,
+        )
+        for name, one in found.predictions.items()
+    ]
+    columns = ("decay", ("samples", "d"), ("inside band %", ".1f"), ("half width rpm", "3"))
+    yield make_table("Prediction of held-out decays by the others", columns, rows)

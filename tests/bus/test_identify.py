@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""Real bus logs of two trucks: phases, ratios, delay and resonance from all logs together."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.bus.identify import BusIdentification, identify_bus
+from drivetwin.bus.phases import PhaseName
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.findings import Code
+from drivetwin.logs.read import read_log
+from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.spec import PriorValue
+from tests.shifts.fixtures import shared
+
+DRIVES = (0, 3, 4, 9, 12)
+RATIOS = {"7": 2.61, "8": 1.94, "9": 1.39}
+
+
+def make_card(ratios: dict[str, float]) -> RatioCard:
+    return RatioCard("", {gear: PriorValue(one, 0.006 * one) for gear, one in ratios.items()})
+
+
+@cache
+def read_drive(number: int) -> ShiftLog:
+    path = shared(f"cases/real_truck/drive_{number}.csv")
+    return read_log(path, None, path.parent / "mapping.toml")
+
+
+@cache
+def identify() -> BusIdentification:
+    return identify_bus([read_drive(one) for one in DRIVES], make_card(RATIOS))
+
+
+def test_every_drive_has_its_shift() -> None:
+    shifts = identify().shifts
+    assert [(one.start_gear, one.end_gear) for one in shifts] == [
+        ("7", "8"),
+        ("7", "8"),
+        ("9", "8"),
+        ("7", "8"),
+        ("7", "8"),
+    ]
+    for one in shifts:
+        assert [name for name, _ in one.phases] == [PhaseName.BETWEEN_GEARS, PhaseName.ENGAGED]
+
+
+def test_no_phase_ends_before_it_begins() -> None:
+    for one in identify().shifts:
+        spans = [span for _, span in one.phases]
+        assert all(low < high for low, high in spans)
+        assert all(a[1] <= b[0] for a, b in pairwise(spans))
+
+
+def test_one_resonance_and_the_shift_that_contradicts_it() -> None:
+    found = identify()
+    frequency, std = found.decays["8"].compute_frequency()
+    assert 3.0 < frequency < 3.4
+    assert 0.02 < std < 0.2
+    named = [one for one in found.findings if one.code is Code.BUS_SHIFTS_CONTRADICT]
+    assert any("drive_4" in one.names["shift"] for one in named)
+
+
+def test_one_delay_of_the_output_speed() -> None:
+    one = identify().estimates["speed_delay.output_speed"]
+    assert one.value == pytest.approx(0.0185, abs=0.0015)
+    assert one.std_total is not None
+    assert one.std_total < 0.001
+
+
+@pytest.mark.parametrize("held", DRIVES)
+def test_the_others_predict_the_decay_left_out(held: int) -> None:
+    fitted = [read_drive(one) for one in DRIVES if one != held]
+    found = identify_bus(fitted, make_card(RATIOS), [read_drive(held)])
+    assert len(found.predictions) == 1
+    for one in found.predictions.values():
+        assert one.share_inside >= 0.85
+
+
+def test_the_automated_clutch_has_named_phases() -> None:
+    path: Path = shared("cases/real_truck/vehicle_2_upshift.csv")
+    found = identify_bus([read_log(path, None)], make_card({"1": 6.25, "2": 3.37}))
+    (shift,) = found.shifts
+    assert [name for name, _ in shift.phases] == [
+        PhaseName.CLUTCH_OPENS,
+        PhaseName.NEUTRAL,
+        PhaseName.SYNCHRONISED,
+        PhaseName.CLUTCH_CLOSES,
+    ]
+    assert np.isclose(shift.lockup or 0.0, 1.2, atol=0.1)
+    assert found.estimates["eta"].value is None
+    assert "torque meter" in found.estimates["eta"].reason

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin identify` on bus logs: a card of the ratios, held-out logs, refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivetwin.cli import main
+from drivetwin.files.bus_file import BusFile
+
+RPM = 30.0 / np.pi
+
+
+def write_log(path: Path, seed: int, *, output_torque: bool = False) -> Path:
+    """A shift from ratio 2.6 to 1.9 with a decay of 3 Hz, in messages of 10 ms."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 5.0, 0.01)
+    output = 70.0 + 1.5 * time
+    ratio = np.interp(time, [1.0, 1.4], [2.6, 1.9])
+    later = np.maximum(time - 1.4, 0.0)
+    swing = 2.0 * np.exp(-1.5 * later) * np.sin(2.0 * np.pi * 3.0 * later)
+    inlet = ratio * output + swing
+    columns = {
+        "time [s]": time,
+        "input_speed [rpm]": RPM * inlet,
+        "output_speed [rpm]": RPM * inlet / ratio,
+        "gear [-]": np.where(time < 1.2, 1.0, 2.0),
+    }
+    if output_torque:
+        columns["output_torque [Nm]"] = np.full(time.size, 300.0) + rng.normal(0.0, 1.0, time.size)
+    table = np.column_stack(list(columns.values()))
+    table[:, 1:3] = np.round((table[:, 1:3] + rng.normal(0.0, 0.3, (time.size, 2))) / 0.125) * 0.125
+    rows = [",".join(f"{value:.6g}" for value in row) for row in table]
+    path.write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("bus")
+    return [write_log(folder / f"run{seed}.csv", seed) for seed in range(3)]
+
+
+@pytest.fixture(scope="module")
+def card(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("card") / "ratios.toml"
+    gears = "".join(f'[[gears]]\nname = "{k}"\nratio = {i}\n' for k, i in ((1, 2.6), (2, 1.9)))
+    path.write_text(gears, encoding="utf-8")
+    return path
+
+
+def test_all_logs_are_identified_as_one_vehicle(
+    logs: list[Path], card: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    held = ["--hold-out", "run2"]
+    names = [str(one) for one in logs]
+    assert main(["identify", *names, "--vehicle", str(card), *held, "-o", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    assert "Lock-up frequency" in shown
+    assert "between gears" in shown
+    assert {one.name for one in tmp_path.iterdir()} == {"bus.json", "report.html"}
+    found = BusFile.model_validate_json((tmp_path / "bus.json").read_text(encoding="utf-8"))
+    value = found.parameters["f_d_2"].value
+    assert value == pytest.approx(3.0, abs=0.05)
+    assert found.parameters["J_engine"].value is None
+    assert [one.shift.split(",")[0] for one in found.predictions] == ["run2.csv"]
+    assert len(found.shifts) == 2
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Held-out decays" in page
+
+
+def test_without_a_card_the_ratios_are_those_of_the_speeds(
+    logs: list[Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(logs[0]), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["ratios"] == pytest.approx({"1": 2.6, "2": 1.9}, rel=2e-3)
+    assert found["parameters"]["f_d_2"]["verdict"] == "weak"
+    assert "one shift" in found["parameters"]["f_d_2"]["reason"]
+
+
+def test_an_output_torque_needs_a_vehicle_card(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = write_log(tmp_path / "torque.csv", 1, output_torque=True)
+    assert main(["identify", str(log)]) == 2
+    assert "no vehicle card is given" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--strict"], "no model to validate"),
+        (["--hold-out", "other"], "names no log"),
+        (["--hold-out", "run0"], "all logs are held out"),
+    ],
+)
+def test_what_bus_logs_cannot_give_is_refused(
+    logs: list[Path], more: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(logs[0]), *more]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_faults_of_a_card_of_ratios_are_listed(
+    logs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "card.toml"
+    path.write_text('[[gears]]\nname = "1"\nratio = -2.0\n', encoding="utf-8")
+    assert main(["identify", str(logs[0]), "--vehicle", str(path)]) == 2
+    assert "gears[0].ratio" in capsys.readouterr().err
