@@ -22,6 +22,7 @@ and names of a finding. The severity is `warning` where none is given. `python -
 tools.findings_page` writes this page. The last column leads to [questions and
 answers](../questions.md).
 """
+SENSORS = "Which sensors do I need?"
 WEAK, INVALID, FAULTS, SHIFTLESS, LATE, MU, CARD, TWIN, METHODS = (
     *("All values are weak: what now?", "Not valid: what now?"),
     *("A channel has faults: does it matter?", "The log has no shift: what now?"),
@@ -38,6 +39,7 @@ _BY_GROUP = {
     "Reasons of estimates": WEAK,
     "Plausibility of the vehicle card, before an identification": CARD,
     "Lock-up clutch of a converter": INVALID,
+    "Bus logs": SENSORS,
 }
 _BY_CODE = (
     (r"clock|torque_late|delay", LATE),

@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.plain_values import format_json
 from drivetwin._util.version import get_program_version
 from drivetwin.bus.identify import BusIdentification
 from drivetwin.bus.phases import BusShift
@@ -143,5 +141,4 @@ def _build_shift(log: str, shift: BusShift) -> BusShiftRecord:
 
 def format_bus_file(file: BusFile) -> str:
     """Return the file as JSON text."""
-    content: dict[str, Any] = to_plain_values(file.model_dump(mode="json", by_alias=True))
-    return json.dumps(content, allow_nan=False, ensure_ascii=False, indent=2) + "\n"
+    return format_json(file.model_dump(mode="json", by_alias=True))
