@@ -215,19 +215,19 @@ def _build_request(
 
 def _open_stages(request: Calibrate) -> StagesFile:
     """Open the store of finished stages beside the output folder."""
+    from drivetwin._util.regular_file import compute_digest
     from drivetwin._util.version import get_program_version
-    from drivetwin.files.calibration_file import hash_file
     from drivetwin.files.stages_file import StagesFile, resume_stages
 
     contents = {
-        f"{name} file": "" if path is None else hash_file(path)
+        f"{name} file": "" if path is None else compute_digest(path)
         for name, path in request.list_files().items()
     }
     if request.controller is not None:
         from drivetwin.files.controller_file import load_controller_file
 
         source = request.controller.parent / load_controller_file(request.controller).source
-        contents["controller source"] = hash_file(source)
+        contents["controller source"] = compute_digest(source)
     version = {"program version": get_program_version()}
     inputs = {**contents, **request.describe_settings(), **version}
     whole = request.output.resolve()
@@ -349,6 +349,7 @@ def _write_results(
 ) -> None:
     from drivetwin._util.atomic import write_text
     from drivetwin._util.plain_values import format_json
+    from drivetwin._util.regular_file import compute_digest
     from drivetwin._util.version import get_program_version
     from drivetwin.cli.atomic_outputs import write_atomically
     from drivetwin.export.parameters.files import ParameterFormat, write_parameters
@@ -358,7 +359,6 @@ def _write_results(
         Provenance,
         build_calibration_file,
         build_certificate_document,
-        hash_file,
         write_calibration_file,
     )
     from drivetwin.files.twin_file import save_twin
@@ -372,7 +372,7 @@ def _write_results(
         twin.name,
         label,
         request.policy,
-        {one.name: hash_file(one) for one in sources},
+        {one.name: compute_digest(one) for one in sources},
         task.spread,
         request.describe_settings(),
     )

@@ -193,9 +193,9 @@ def _print_resonances(seen: _SpeedResults) -> None:
     refused: dict[str, list[str]] = {}
     for shift, swing in seen.swings:
         if isinstance(swing, str):
-            refused.setdefault(swing, []).append(_format_name(shift))
+            refused.setdefault(swing, []).append(shift.name)
         else:
-            print_paragraph(f"{_format_name(shift)}: {_describe_resonance(swing)}")
+            print_paragraph(f"{shift.name}: {_describe_resonance(swing)}")
     for reason, labels in refused.items():
         names = ", ".join(dict.fromkeys(labels))
         count = f" ({len(labels)} shifts)" if len(labels) > 1 else ""
@@ -214,10 +214,6 @@ def _print_remarks(found: FoundShifts) -> None:
         start, end = candidate.time
         more = f" (first of {count} for this reason)" if count > 1 else ""
         print_paragraph(f"rejected, {start:z.3f} s to {end:z.3f} s: {candidate.reason}{more}")
-
-
-def _format_name(shift: Shift) -> str:
-    return f"{shift.start_gear}→{shift.end_gear}"
 
 
 def _describe_resonance(swing: Resonance) -> str:

@@ -81,7 +81,7 @@ def simulate(request: Simulate, *, as_json: bool) -> None:
         print_json({"shifts": [_to_document(run) for run in runs]})
         return
     for run in runs:
-        title = f"Shift {run.shift.start_gear}→{run.shift.end_gear}: {run.status}"
+        title = f"Shift {run.shift.name}: {run.status}"
         print_blocks([build_fit_table(run.fit, title)])
         print_findings(run.findings)
     for file in request.output:

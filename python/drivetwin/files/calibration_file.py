@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -150,11 +149,6 @@ class Provenance:
 
 _STATED = ("unit", "start", "low", "high", "text")
 """Attributes of a parameter of the policy that the file repeats."""
-
-
-def hash_file(path: Path) -> str:
-    """Return the SHA-256 of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def build_calibration_file(

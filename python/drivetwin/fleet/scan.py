@@ -15,7 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from time import monotonic
 
-from drivetwin._util.regular_file import measure_regular_file
+from drivetwin._util.regular_file import compute_digest, measure_regular_file
 from drivetwin._util.version import get_program_version
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
@@ -198,8 +198,7 @@ def _compute_key(*parts: str) -> str:
 
 def _compute_digest(path: Path) -> str:
     measure_regular_file(path, FileFormatError)
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return compute_digest(path)
 
 
 def _format_path(path: Path) -> str:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterable, Mapping, Sequence, Set
 from contextlib import ExitStack
@@ -12,6 +11,7 @@ from pathlib import Path
 
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages, notify_progress
+from drivetwin._util.regular_file import compute_digest
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
@@ -120,7 +120,7 @@ def read_log(
         with _STAGES.enter("opening"):
             recording, stated = stack.enter_context(open_as_mapped(path, stated, card))
         log = read_recording(recording, path, card, stated, Demands(needed, sound, gearing), window)
-    mappings = {} if stated.file is None else {stated.file.name: _compute_digest(stated.file)}
+    mappings = {} if stated.file is None else {stated.file.name: compute_digest(stated.file)}
     return replace(log, mappings=mappings)
 
 
@@ -149,7 +149,7 @@ def read_recording(
     with _STAGES.enter("channels"), name_project_mapping(stated):
         log = assemble_log(recording, str(path), card, stated, demands, window)
     with _STAGES.enter("digest"):
-        return replace(log, sha256=_compute_digest(path))
+        return replace(log, sha256=compute_digest(path))
 
 
 def assemble_log(
@@ -337,11 +337,6 @@ def read_raw(path: Path, options: ReadOptions | None = None) -> RawLog:
             except DamagedChannelError as fault:
                 unreadable[str(column)] = fault.what
         return RawLog(tuple(channels), unreadable, recording.warnings, str(path))
-
-
-def _compute_digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _load_column(recording: Recording, spec: ChannelSpec) -> int:

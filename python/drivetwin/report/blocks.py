@@ -144,7 +144,7 @@ class Section:
 
 def make_link(shift: Shift) -> str:
     """The `link` of all figures of one shift."""
-    return f"{shift.start_gear}→{shift.end_gear} at {shift.lockup_time:z.3f} s"
+    return f"{shift.name} at {shift.lockup_time:z.3f} s"
 
 
 def make_notes(heading: str, items: Iterable[str], tone: Tone = Tone.PLAIN) -> list[Block]:

@@ -74,7 +74,7 @@ def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) 
 
 def make_trial_label(log: str, shift: Shift) -> str:
     """Name log and shift of a trial."""
-    return f"{log}, {shift.start_gear}→{shift.end_gear} at {shift.lockup_time:.1f} s"
+    return f"{log}, {shift.name} at {shift.lockup_time:.1f} s"
 
 
 def simulate_trials(

@@ -162,7 +162,7 @@ def render_report(found: Identification, log: ShiftLog, library: str | None = No
     """HTML text of the report; equal inputs give equal text. `library` as in `render_page`."""
     with PAGE.enter("sections"):
         sections = build_report_sections(found, log)
-    shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in found.shifts)
+    shifts = ", ".join(shift.name for shift in found.shifts)
     return render_page(
         title=f"Driveline model from {Path(log.source).name}",
         subtitle=f"shift {shifts} · method {found.method.value} · loss law {found.loss_law}",

@@ -111,7 +111,7 @@ def _(log: ShiftLog) -> Summary:
 
 @summarise.register
 def _(found: Identification) -> Summary:
-    shifts = ", ".join(f"{one.start_gear}→{one.end_gear}" for one in found.shifts)
+    shifts = ", ".join(one.name for one in found.shifts)
     title = f"{', '.join(found.inputs)}: shift {shifts}, {found.method.value} method"
     return Summary(title, build_identification_blocks(found))
 
@@ -125,6 +125,6 @@ def _(twin: Twin) -> Summary:
 @summarise.register
 def _(validation: Validation) -> Summary:
     shift = validation.shift
-    title = f"Shift {shift.start_gear}→{shift.end_gear} simulated: {validation.status}"
+    title = f"Shift {shift.name} simulated: {validation.status}"
     findings = build_findings_section(validation.findings).blocks
     return Summary(title, [build_fit_table(validation.fit), *findings])

@@ -28,7 +28,7 @@ def _build_section(number: int, one: Observation, log: ShiftLog) -> Section:
     phases = clip_phases(one.shift, (float(one.time[0]), float(one.time[-1])))
     figure = stack_panels(panels, phases, height=280 * len(panels))
     drawn = FigureBlock(figure, "Each torque with its 95 % band.")
-    name = f"Shift {one.shift.start_gear}→{one.shift.end_gear}"
+    name = f"Shift {one.shift.name}"
     blocks = [drawn, *build_torque_blocks(one)]
     return Section(f"shift{number}", name, f"A {one.shift.kind}.", blocks)
 
@@ -43,7 +43,7 @@ def build_torque_blocks(one: Observation) -> list[Block]:
         *("torque", ("lowest [Nm]", "z.0f"), ("highest [Nm]", "z.0f")),
         *(("± 95 % [Nm]", "z.1f", "mean"), ("± 95 % [Nm]", "z.1f", "largest")),
     )
-    caption = f"Shift {one.shift.start_gear}→{one.shift.end_gear} by {one.observer}"
+    caption = f"Shift {one.shift.name} by {one.observer}"
     return [make_table(caption, columns, rows), *make_notes("Missing in the log", one.notes)]
 
 

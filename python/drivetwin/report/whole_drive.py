@@ -49,7 +49,7 @@ def render_whole_drive(
     if outlying:
         text = "Shifts of which a figure is an outlier, in their place in the log."
         figures = [
-            FigureBlock(plot_shift_phases(log, one), f"{_format_gears(one)}, {one.kind.value}.")
+            FigureBlock(plot_shift_phases(log, one), f"{one.name}, {one.kind.value}.")
             for one in shifts
             if one.lockup_time in outlying
         ]
@@ -169,7 +169,7 @@ def build_quality_tables(shifts: Sequence[Shift]) -> Iterator[TableBlock]:
     """Build tables of shift quality, one column for each shift; split if there are many."""
     for first in range(0, len(shifts), _BESIDE):
         part = shifts[first : first + _BESIDE]
-        names = [f"{one.start_gear}→{one.end_gear}, {one.lockup_time:z.2f} s" for one in part]
+        names = [f"{one.name}, {one.lockup_time:z.2f} s" for one in part]
         rows = []
         for figure, unit in QUALITY_UNITS.items():
             if any(figure in one.quality for one in part):
@@ -195,17 +195,17 @@ def plot_quality(name: str, shifts: Sequence[Shift], *, over_time: bool = False)
     by_gear = sorted(
         shown, key=lambda one: (not one.kind.is_up, len(one.start_gear), one.start_gear)
     )
-    order = list(dict.fromkeys(_format_gears(one) for one in by_gear))
+    order = list(dict.fromkeys(one.name for one in by_gear))
     figure = Figure()
     for k, kind in enumerate(one for one in ShiftKind if any(s.kind is one for s in shown)):
         alike = [one for one in shown if one.kind is kind]
         style = get_candidate_style(k)
         figure.add_scatter(
-            x=[one.lockup_time if over_time else _format_gears(one) for one in alike],
+            x=[one.lockup_time if over_time else one.name for one in alike],
             y=[display.factor * one.quality[name] for one in alike],
             mode="markers",
             name=kind.value,
-            text=[f"{_format_gears(one)} at {one.lockup_time:.2f} s" for one in alike],
+            text=[f"{one.name} at {one.lockup_time:.2f} s" for one in alike],
             marker={"color": style.colour, "symbol": style.symbol, "size": 8},
             hovertemplate=f"%{{text}}: %{{y:.3g}} {display.label}<extra>{kind.value}</extra>",
         )
@@ -220,7 +220,3 @@ def plot_quality(name: str, shifts: Sequence[Shift], *, over_time: bool = False)
         )
     )
     return figure
-
-
-def _format_gears(shift: Shift) -> str:
-    return f"{shift.start_gear}→{shift.end_gear}"

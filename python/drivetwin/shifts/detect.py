@@ -36,9 +36,7 @@ class FoundShifts(NamedTuple):
 
     def __repr__(self) -> str:
         """Name the shifts with the time [s] of lock-up; the default lists every number of all."""
-        named = (
-            f"{one.start_gear}→{one.end_gear} at {one.lockup_time:.2f} s" for one in self.shifts
-        )
+        named = (f"{one.name} at {one.lockup_time:.2f} s" for one in self.shifts)
         return f"<FoundShifts: {', '.join(named) or 'none'}; {len(self.rejected)} rejected>"
 
 

@@ -79,6 +79,11 @@ class Shift:
     quality: dict[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
+    @property
+    def name(self) -> str:
+        """Gears, as `2→3`."""
+        return f"{self.start_gear}→{self.end_gear}"
+
 
 @dataclass(frozen=True)
 class RejectedShift:

@@ -87,7 +87,7 @@ def _split(shifts: Sequence[Shift]) -> Mapping[tuple[ShiftKind, str], list[Shift
     """Shifts by kind and pair of gears."""
     found: dict[tuple[ShiftKind, str], list[Shift]] = {}
     for one in shifts:
-        found.setdefault((one.kind, f"{one.start_gear}→{one.end_gear}"), []).append(one)
+        found.setdefault((one.kind, one.name), []).append(one)
     return found
 
 
@@ -225,7 +225,7 @@ def collect_findings(shifts: Iterable[Shift]) -> tuple[tuple[Finding, tuple[str,
         own = {(one.code, one.names.get("gear", "")): one for one in shift.findings}
         for key, one in own.items():
             first.setdefault(key, one)
-            labels.setdefault(key, []).append(f"{shift.start_gear}→{shift.end_gear}")
+            labels.setdefault(key, []).append(shift.name)
     return tuple((first[key], tuple(labels[key])) for key in first)
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError, field_validator
 
 from drivetwin._util.atomic import write_bytes, write_text
+from drivetwin._util.regular_file import compute_digest
 from drivetwin._util.toml import FromTable, StrictModel, format_key_path
 from drivetwin._util.version import get_program_version
 from drivetwin.channels.mapping_file import ChannelTable
@@ -179,12 +179,6 @@ def _locate_source(entry: FileEntry, folder: Folder, label: str) -> Source:
             Where(file=label),
         )
     return Source(entry.path, path)
-
-
-def compute_digest(path: Path) -> str:
-    """SHA-256 of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _make_log_entry(one: OpenLog, beside: Path, folder: Folder) -> LogEntry:

@@ -313,7 +313,7 @@ def _compute_gains(
     """Compute the information of each experiment on shift k; failed simulations are left out."""
     point = _add_delay(fit)
     base = BaseShift(fit.problem.terms[k], point, signals[k].shift.lockup_time)
-    names = [f"{one.shift.start_gear}→{one.shift.end_gear}" for one in signals]
+    names = [one.shift.name for one in signals]
     label = names[k] if len(set(names)) > 1 else ""
     found = []
     for number, experiment in enumerate(Experiment):

@@ -65,7 +65,7 @@ class Validation(DisplayMixin):
     extra_traces: Mapping[str, SignalTrace] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        shift = f"{self.shift.start_gear}→{self.shift.end_gear}"
+        shift = self.shift.name
         fits = (f"{name} {one['all'].fit_percent:.1f} %" for name, one in self.fit.items())
         return f"<Validation of shift {shift}: {self.status}, fit {', '.join(fits)}>"
 
@@ -126,7 +126,7 @@ class HeldOut:
     @property
     def name(self) -> str:
         """The shift and its log in words."""
-        return f"{Path(self.source).name}, shift {self.shift.start_gear}→{self.shift.end_gear}"
+        return f"{Path(self.source).name}, shift {self.shift.name}"
 
 
 @dataclass(frozen=True)

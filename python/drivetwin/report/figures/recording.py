@@ -42,7 +42,7 @@ def plot_log(log: ShiftLog, shifts: Sequence[Shift] = ()) -> Figure:
     """
     panels = build_log_panels(log)
     whole = compute_full_range(panels)
-    names = [f"{shift.start_gear}→{shift.end_gear}" for shift in shifts]
+    names = [shift.name for shift in shifts]
     spans = [get_shift_spans(shift) for shift in shifts]
     zooms = {"whole": whole}
     for name, shift, span in zip(names, shifts, spans, strict=True):

@@ -65,7 +65,7 @@ def _build_overview(validations: Sequence[Validation]) -> FigureBlock:
     """Draw the shift whose output torque, else input speed, is followed least."""
     shown = min(validations, key=_get_fit_percent)
     shift = shown.shift
-    text = f"Shift {shift.start_gear}→{shift.end_gear}, measured and simulated"
+    text = f"Shift {shift.name}, measured and simulated"
     if len(validations) > 1:
         text += f": the one of {len(validations)} shifts with the lowest fit"
     text += ". 1 gear held, 2 torque phase, 3 inertia phase, 4 new gear locked."

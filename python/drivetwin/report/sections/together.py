@@ -101,7 +101,7 @@ def build_log_table(found: Identification, several: Several) -> TableBlock:
     rows = []
     for one in several.logs:
         mine = {name: key for key, (name, number) in own.items() if number == one.number}
-        shifts = ", ".join(f"{shift.start_gear}→{shift.end_gear}" for shift in one.shifts)
+        shifts = ", ".join(shift.name for shift in one.shifts)
         values = (make_value_cell(found.estimates.get(mine.get(n, "")), units[n]) for n in plain)
         fits = (make_fit_cell(one.fit.get(signal, {}).get("all"), signal) for signal in SIGNALS)
         rows.append((str(one.number), Path(one.source).name, shifts, *values, *fits))

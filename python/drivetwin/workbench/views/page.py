@@ -214,7 +214,7 @@ def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
             parts.append(f" and {others} more {'log' if others == 1 else 'logs'}")
         parts.append(f" · {'no card' if work.card is None else f'card {work.card.name}'}")
         for shift in work.shifts:
-            parts.append(f" · shift {shift.start_gear}→{shift.end_gear}")
+            parts.append(f" · shift {shift.name}")
         if work.results:
             parts.append(f" · identified: {', '.join(method.value for method in work.results)}")
         return [*parts, f" · {access.describe()}"]
