@@ -16,7 +16,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from drivetwin.drive.driver import LONGEST_SHIFT, PEDAL_RAMP, STEP, Driver, State
+from drivetwin.drive.driver import LOCK_UP_RAMP, LONGEST_SHIFT, PEDAL_RAMP, STEP, Driver, State
 from drivetwin.drive.network import BRAKE, PEDAL
 from drivetwin.drive.plan import LONGEST_LEG, Leg, ShiftTo, Watched, list_forward_gears
 from drivetwin.drive.powertrain import Powertrain
@@ -97,6 +97,16 @@ def _get_slip(gearbox: Gearbox, name: str) -> dict[str, float]:
     return {element.a: 1.0, element.b: -1.0}
 
 
+@dataclass(frozen=True)
+class _Closing:
+    """How a starting clutch closes: it takes up `torque` [N m] within `ramp` [s] and slips."""
+
+    clutch: str
+    pedal: float
+    torque: float
+    ramp: float
+
+
 class DogDriver(Driver):
     """Decisions on a gearbox with dogs."""
 
@@ -173,7 +183,7 @@ class DogDriver(Driver):
         swing = self.engine_inertia * abs(slip) / self.phase
         carried = max(0.0, float(np.sign(slip)) * torque + swing)
         schedule = opened.schedule.add_knots(PEDAL, at, (PEDAL_RAMP, leg.pedal))
-        schedule, done = self._close(schedule, at, new.clutch, leg.pedal, carried)
+        schedule, done = self._close(schedule, at, _Closing(new.clutch, leg.pedal, carried, RAMP))
         ratios = [self.gearbox.get_gear(name).published for name in (state.gear, gear)]
         kind = ShiftKind.from_direction(up=ratios[1] < ratios[0], power_on=torque > 0.0)
         label = f"{state.gear}→{gear}"
@@ -183,15 +193,16 @@ class DogDriver(Driver):
         return replace(opened, time=done, gear=gear, schedule=schedule, actions=actions)
 
     def run_lock_up(
-        self, closed: bool, leg: Leg, state: State, start: float, now: Mapping[Output, float]
+        self, closed: bool, leg: Leg, state: State, start: float, _now: Mapping[Output, float]
     ) -> State:
         """Launch on the starting clutch of the gear, or open it."""
         clutch, schedule = self.gears[state.gear].clutch, state.schedule
         if closed:
-            torque = self._compute_torque(leg.pedal, now["speed", self.crank])
-            schedule, done = self._close(
-                schedule, start, clutch, leg.pedal, MARGIN * max(0.0, torque), LONGEST_LEG
-            )
+            engine = self.powertrain.engine
+            speeds = np.array(engine.speed)
+            largest = float(engine.compute_steady_torque(leg.pedal, speeds).max())
+            launch = _Closing(clutch, leg.pedal, MARGIN * max(0.0, largest), LOCK_UP_RAMP)
+            schedule, done = self._close(schedule, start, launch, LONGEST_LEG)
             action = Action("launch", "clutch", start, done, None, clutch)
         else:
             done = start + CLOSE
@@ -204,19 +215,18 @@ class DogDriver(Driver):
         self,
         schedule: Schedule,
         start: float,
-        clutch: str,
-        pedal: float,
-        torque: float,
+        closing: _Closing,
         longest: float = LONGEST_SHIFT,
     ) -> tuple[Schedule, float]:
-        """Slip a starting clutch with a torque [N m] until it is synchronous, then close it.
+        """Slip a starting clutch until it is synchronous, then close it.
 
         Return the inputs and the time at which it is closed [s].
         """
+        clutch, torque = closing.clutch, closing.torque
         capacity = self.gearbox.get_capacity(clutch)
         slip = self._look(schedule, start)["slip", clutch]
         level = compute_pressure(capacity, torque, abs(slip))
-        schedule = schedule.add_knots(clutch, start, (RAMP, level))
+        schedule = schedule.add_knots(clutch, start, (closing.ramp, level))
         side = float(np.sign(slip))
         synchronous = self.find_synchronism(schedule, start, (clutch, side), longest)
         if synchronous is None:
@@ -225,7 +235,7 @@ class DogDriver(Driver):
                 "use more pedal, or a powertrain that suits the gearbox and the load",
             )
         speed = self._look(schedule, synchronous)["speed", self.crank]
-        holding = MARGIN * abs(self._compute_torque(pedal, speed))
+        holding = MARGIN * abs(self._compute_torque(closing.pedal, speed))
         enough = max(level, compute_pressure(capacity, holding, 0.0))
         points = (RAMP, enough), (RAMP + CLOSE, max(self.powertrain.control.main, enough))
         return schedule.add_knots(clutch, synchronous, *points), synchronous + points[-1][0]

@@ -46,8 +46,8 @@ STEP = 1e-3
 """Time between recorded samples, s: eighty per period of the output shaft."""
 PEDAL_RAMP = 0.2
 """Time in which pedal and brake move, s."""
-_LOCK_UP_RAMP = 0.5
-"""Time in which the lock-up clutch takes the torque over, s."""
+LOCK_UP_RAMP = 0.5
+"""Time in which the lock-up clutch, or a starting clutch, takes the torque over, s."""
 _LOCK_UP_MARGIN = 1.3
 """Torque of the closing lock-up clutch over the engine torque: what slows the engine down."""
 _LOCK_UP_HOLD = 0.3
@@ -277,7 +277,7 @@ class Driver:
         carrying = compute_pressure(
             clutch, _LOCK_UP_MARGIN * abs(torque), abs(now["slip", LOCK_UP])
         )
-        taken = FILL + _LOCK_UP_RAMP
+        taken = FILL + LOCK_UP_RAMP
         held = taken + _LOCK_UP_HOLD
         main = self.powertrain.control.main
         return (FILL, clutch.P0), (taken, carrying), (held, carrying), (held + CLOSE, main)

@@ -30,7 +30,7 @@ from drivetwin.simulation.dual_clutch import FloatArray
 
 def render_drive(run: DriveRun, title: str) -> str:
     """HTML text of the page; equal drives give equal text."""
-    motion = FigureBlock(plot_motion(run), "Speeds, torques, converter and pressures.")
+    motion = FigureBlock(plot_motion(run), "Speeds, torques, pedal and pressures.")
     shifts = [
         FigureBlock(
             plot_maneuver(run, each),
@@ -216,11 +216,12 @@ def plot_energy(run: DriveRun) -> Figure:
 def _build_speed_curves(run: DriveRun, inside: slice) -> list[Curve]:
     time = run.time[inside]
     shafts = run.shaft_speed or {"gearbox input": run.input_speed}
+    colours = cycle((SIMULATED, SECOND, ACCENT, MUTED))
     return [
         Curve("engine", time, run.engine_speed[inside], MEASURED),
         *(
             Curve(name, time, values[inside], colour)
-            for (name, values), colour in zip(shafts.items(), cycle(SERIES[1:]), strict=False)
+            for (name, values), colour in zip(shafts.items(), colours, strict=False)
         ),
         Curve("gearbox output", time, run.output_speed[inside], COMPARED),
     ]

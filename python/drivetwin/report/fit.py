@@ -33,7 +33,7 @@ from drivetwin.report.html import render_page
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.parameters import build_parameter_blocks
-from drivetwin.report.style import MEASURED, MUTED, SIMULATED
+from drivetwin.report.style import MEASURED, MUTED, OVER, SIMULATED, UNDER
 from drivetwin.simulation.network import NetworkRun
 
 _HEIGHT = 190
@@ -109,8 +109,8 @@ def _build_figure(log: str, term: NetworkTerm, run: NetworkRun) -> FigureBlock:
     for out in term.record.outputs:
         output = term.plant.outputs[out.name]
         curves = [
-            Curve("measured", term.record.time[out.place], out.values, MEASURED),
-            Curve("simulated", run.time, run.columns[output], SIMULATED),
+            Curve("simulated", run.time, run.columns[output], SIMULATED, UNDER),
+            Curve("measured", term.record.time[out.place], out.values, MEASURED, OVER),
         ]
         panels.append(Panel(out.name, _get_display(get_output_quantity(output)), curves))
     for name, signal in term.record.inputs.items():

@@ -22,6 +22,8 @@ SERIES = (MEASURED, SIMULATED, COMPARED, SECOND, ACCENT, MUTED)
 """Colours of curves of equal rank."""
 BAND = "rgba(213,94,0,0.18)"
 """Filling of a 95 % band."""
+UNDER, OVER = 4.0, 1.1
+"""Widths of a simulated line and of the measured one over it: both are visible where they agree."""
 
 VERDICT_COLOURS = {
     Verdict.IDENTIFIED: "#009E73",

@@ -18,7 +18,7 @@ from drivetwin.report.figures.stack import (
     stack_panels,
 )
 from drivetwin.report.figures.validation import plot_validation
-from drivetwin.report.style import MEASURED, MUTED, SIMULATED
+from drivetwin.report.style import MEASURED, SIMULATED
 from tests.report.sample import SHIFT, TIME, log, validation
 
 
@@ -63,7 +63,7 @@ def test_values_are_shown_in_display_units() -> None:
 def test_measured_and_simulated_keep_their_colours() -> None:
     figure = plot_validation(validation())
     colours = {trace.name: trace.line.color for trace in figure.data}
-    assert colours["measured"] == MUTED
+    assert colours["measured"] == MEASURED
     assert colours["simulated"] == SIMULATED
 
 

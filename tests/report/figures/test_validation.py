@@ -43,7 +43,7 @@ def test_measured_slip_of_a_held_element_is_zero() -> None:
         panel.quantity: panel for panel in plot_further_signals(replace(one, trajectory=run)).panels
     }
     for name, inside in held.items():
-        measured, simulated = panels[f"slip of {name}"].curves
+        simulated, measured = panels[f"slip of {name}"].curves
         assert (measured.name, simulated.name) == ("measured", "simulated")
         assert np.mean(measured.values[inside]) == pytest.approx(0.0, abs=0.5)
         assert np.abs(np.mean(measured.values[~inside])) > 5.0

@@ -19,7 +19,7 @@ from drivetwin.report.figures.stack import (
     plot_over_time_axis,
     stack_panels,
 )
-from drivetwin.report.style import COMPARED, MEASURED, MUTED, SECOND, SIMULATED
+from drivetwin.report.style import COMPARED, MEASURED, MUTED, OVER, SECOND, SIMULATED, UNDER
 
 OUTPUTS: Mapping[str, tuple[str, Display, float]] = {
     "output_torque": ("output torque", NM, 1.6),
@@ -91,20 +91,20 @@ def _build_slip_panels(validation: Validation) -> Iterator[Panel]:
     for element in validation.model.elements:
         if element.name not in run.slip:
             continue
-        curves = [Curve("simulated", run.time, run.slip[element.name], SIMULATED, width=1.8)]
+        curves = [Curve("simulated", run.time, run.slip[element.name], SIMULATED, UNDER)]
         if "input_speed" in traces and "output_speed" in traces:
             inlet, outlet = traces["input_speed"], traces["output_speed"]
             behind = np.interp(inlet.time, outlet.time, outlet.measured)
             slip: FloatArray = inlet.measured / element.i_c - element.i_out * behind
-            curves.insert(0, Curve("measured", inlet.time, slip, MUTED, width=1.0))
+            curves.append(Curve("measured", inlet.time, slip, MEASURED, OVER))
         yield Panel(f"slip of {element.name}", RPM, curves)
 
 
 def build_pair(trace: SignalTrace) -> list[Curve]:
-    """Measurement, thin and grey, and the simulation over it."""
+    """Simulation as a broad line, and the measurement as a thin one over it."""
     return [
-        Curve("measured", trace.time, trace.measured, MUTED, width=1.0),
-        Curve("simulated", trace.time, trace.simulated, SIMULATED, width=1.8),
+        Curve("simulated", trace.time, trace.simulated, SIMULATED, UNDER),
+        Curve("measured", trace.time, trace.measured, MEASURED, OVER),
     ]
 
 
