@@ -216,7 +216,7 @@ def plot_energy(run: DriveRun) -> Figure:
 def _build_speed_curves(run: DriveRun, inside: slice) -> list[Curve]:
     time = run.time[inside]
     shafts = run.shaft_speed or {"gearbox input": run.input_speed}
-    colours = cycle((SIMULATED, SECOND, ACCENT, MUTED))
+    colours = cycle(colour for colour in SERIES if colour not in (MEASURED, COMPARED))
     return [
         Curve("engine", time, run.engine_speed[inside], MEASURED),
         *(
