@@ -8,7 +8,7 @@ import json
 import pytest
 from pydantic import ValidationError
 
-from drivetwin.files.fit_file import FitFile, build_fit_file, format_fit_file
+from drivetwin.files.fit_file import FitFile, build_fit_file
 from drivetwin.findings import Code, report
 from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
@@ -38,14 +38,14 @@ def test_the_file_has_the_numbers_of_the_fit() -> None:
 
 
 def test_the_text_reads_back_equal_and_is_the_same_each_time() -> None:
-    text = format_fit_file(build())
-    assert text == format_fit_file(build())
+    text = build().to_json()
+    assert text == build().to_json()
     assert FitFile.model_validate_json(text) == build()
     assert "NaN" not in text
 
 
 def test_a_wrong_key_or_type_is_refused() -> None:
-    content = json.loads(format_fit_file(build()))
+    content = json.loads(build().to_json())
     with pytest.raises(ValidationError, match="nonsense"):
         FitFile.model_validate({**content, "nonsense": 1})
     with pytest.raises(ValidationError, match="chi2"):

@@ -17,8 +17,8 @@ from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.export.parameters.json_file import CODEC
 from drivetwin.export.parameters.of_twin import collect_parameters
-from drivetwin.files.bus_file import BusFile, format_bus_file
-from drivetwin.files.fit_file import build_fit_file, format_fit_file
+from drivetwin.files.bus_file import BusFile
+from drivetwin.files.fit_file import build_fit_file
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, build_json_schema
 from drivetwin.files.twin_file import save_twin
@@ -62,14 +62,12 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
         case FileKind.PARAMETERS:
             yield json.loads(CODEC.text(collect_parameters(twin())))
         case FileKind.FIT:
-            yield json.loads(
-                format_fit_file(build_fit_file(fit_log(ModelName.TIP_IN), ["a.csv"], {}))
-            )
+            yield json.loads(build_fit_file(fit_log(ModelName.TIP_IN), ["a.csv"], {}).to_json())
         case FileKind.BUS:
             empty = BusFile(
                 version="1", logs=[], ratios={}, parameters={}, shifts=[], decays={}, findings=[]
             )
-            yield json.loads(format_bus_file(empty))
+            yield json.loads(empty.to_json())
         case _:
             yield from (tomllib.loads(text) for text in _toml(kind, folder))
 

@@ -33,7 +33,7 @@ _CLOSED = 0.02
 _FLAG_REACH = 1.0
 """Longest time [s] between engaged gear and end of the shift flag that belong to one shift."""
 _CLUSTER = 0.04
-"""Relative distance of two gears that are distinguished without a card; real steps are above 0.1."""
+"""Relative distance of two gears that differ without a card; real steps are above 0.1."""
 _STEADY = 0.3
 """Time [s] over which the ratio of a gear held is constant."""
 

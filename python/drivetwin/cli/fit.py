@@ -103,13 +103,12 @@ def _read_recordings(
 def _write_outputs(folder: Path, answer: _Answer, model: str) -> tuple[Path, ...]:
     """Write result, fitted model and report, all or none."""
     from drivetwin.cli.atomic_outputs import write_texts
-    from drivetwin.files.fit_file import format_fit_file
     from drivetwin.report.fit import render_fit
 
     assert answer.found is not None
     held_out = answer.held_out or {}
     texts = {
-        RESULT: format_fit_file(answer.build_file()),
+        RESULT: answer.build_file().to_json(),
         MODEL: model,
         REPORT: render_fit(answer.found, answer.logs, held_out, answer.remarks),
     }

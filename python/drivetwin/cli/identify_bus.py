@@ -114,11 +114,10 @@ def _find_held(wanted: Sequence[str], logs: Sequence[Path]) -> list[Path]:
 def write_bus(outcome: BusOutcome, folder: Path, settings: Mapping[str, str]) -> tuple[Path, ...]:
     """Write result and report into `folder`, all or none; returns their paths."""
     from drivetwin.cli.atomic_outputs import write_texts
-    from drivetwin.files.bus_file import format_bus_file
     from drivetwin.report.bus import render_bus
 
     texts = {
-        BUS_RESULT: format_bus_file(outcome.build_file(settings)),
+        BUS_RESULT: outcome.build_file(settings).to_json(),
         REPORT: render_bus(outcome.found, outcome.logs, outcome.remarks),
     }
     return write_texts(folder, texts)

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.plain_values import format_json
 from drivetwin._util.version import get_program_version
 from drivetwin.bus.identify import BusIdentification
 from drivetwin.bus.phases import BusShift
@@ -137,8 +136,3 @@ def _build_shift(log: str, shift: BusShift) -> BusShiftRecord:
         lockup=shift.lockup,
         phases=phases,
     )
-
-
-def format_bus_file(file: BusFile) -> str:
-    """Return the file as JSON text."""
-    return format_json(file.model_dump(mode="json", by_alias=True))

@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.plain_values import format_json
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.records import (
@@ -117,8 +116,3 @@ def build_fit_file(
 
 def _build_fits(agreement: Mapping[str, Any]) -> dict[str, FitRecord]:
     return {name: FitRecord.from_result(one) for name, one in agreement.items()}
-
-
-def format_fit_file(file: FitFile) -> str:
-    """Return the file as JSON text."""
-    return format_json(file.model_dump(mode="json", by_alias=True))

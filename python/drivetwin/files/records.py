@@ -25,7 +25,7 @@ from pydantic import (
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.atomic import write_text
-from drivetwin._util.plain_values import convert_nonfinite
+from drivetwin._util.plain_values import convert_nonfinite, format_json
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
@@ -66,6 +66,10 @@ class Record(BaseModel):
     def from_result(cls, result: object) -> Self:
         """Build the record and those of its parts from the attributes of the fields' names."""
         return cls.model_validate(result, from_attributes=True, by_alias=True, by_name=True)
+
+    def to_json(self) -> str:
+        """Return strict JSON text: no NaN, keys as in the published schema."""
+        return format_json(self.model_dump(mode="json", by_alias=True))
 
 
 class FrictionRecord(Record):

@@ -11,7 +11,7 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.plain_values import format_json, to_plain_values
+from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification, LogPull, LogShare
 from drivetwin.estimation.result.cause import Group
@@ -195,10 +195,6 @@ class ResultFile(Record):
             "held_out": evidence.held_out,
             "suggestions": evidence.suggestions,
         }
-
-    def to_json(self) -> str:
-        """Strict JSON text: no NaN, keys as in the published schema."""
-        return format_json(self.model_dump(mode="json", by_alias=True))
 
 
 _SAME_NAME = (

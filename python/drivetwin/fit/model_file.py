@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from drivetwin._util.toml import (
     Fault,
+    FromTable,
     StrictModel,
     format_entry,
     format_key,
@@ -33,7 +34,6 @@ from drivetwin.simulation.network import Start
 
 Positive = Annotated[float, Field(gt=0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
-Bound = Annotated[float, Field(allow_inf_nan=True)]
 _REMEDY = "correct the model file; 'drivetwin schema model' prints its JSON Schema"
 
 
@@ -114,30 +114,6 @@ class StartTable(StrictModel):
     known: list[str] = Field(default_factory=list)
 
 
-class UnknownTable(StrictModel):
-    """`[unknowns."PATH"]`: first guess, prior, bounds; `paths` where several numbers share it.
-
-    A bound of `inf` or `-inf` leaves its side open.
-    """
-
-    value: float
-    std: Positive | None = None
-    bounds: Annotated[list[Bound], Field(min_length=2, max_length=2)] | None = None
-    paths: dict[str, float] | list[str] | None = None
-
-    @model_validator(mode="after")
-    def _check_bounds(self) -> UnknownTable:
-        if self.bounds is not None and not self.bounds[0] < self.bounds[1]:
-            raise ValueError("bounds are the least and the largest value")
-        return self
-
-    def to_unknown(self) -> Unknown:
-        """Return the unknown."""
-        low, high = self.bounds or (-math.inf, math.inf)
-        bounds = (low if math.isfinite(low) else None, high if math.isfinite(high) else None)
-        return Unknown(self.value, self.std, bounds, self.paths)
-
-
 class DrivenInput(StrictModel):
     """`[run.inputs.NAME]`: points of time [s] and value in SI, linear between, and the noise of a
     sample."""
@@ -168,7 +144,7 @@ class NetworkFile(StrictModel):
     inputs: dict[str, InputEntry] = Field(default_factory=dict)
     outputs: dict[str, OutputEntry] = Field(default_factory=dict)
     start: StartTable = StartTable()
-    unknowns: dict[str, UnknownTable] = Field(default_factory=dict)
+    unknowns: dict[str, Annotated[Unknown, FromTable]] = Field(default_factory=dict)
     run: RunTable | None = None
 
 
@@ -213,7 +189,7 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         constant,
         Start(start.speeds, start.twists, tuple(start.locked)),
         {name: to_output(one.quantity) for name, one in file.outputs.items()},
-        {name: one.to_unknown() for name, one in file.unknowns.items()},
+        dict(file.unknowns),
     )
     sought = [resolve_unknown(name, one, elements) for name, one in model.unknowns.items()]
     require_known_places(sought, list_starts(model.start, elements), used)

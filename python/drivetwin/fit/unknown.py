@@ -6,19 +6,32 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
 
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.parameters import ParameterSpec
-from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind
+from drivetwin.simulation.element_schema import Field as ElementField
 
 Bounds = tuple[float | None, float | None]
 """Least and largest value, None where there is none."""
 
 
+def _read_bounds(stated: object) -> object:
+    """Read two numbers of a file; an infinite one leaves its side open."""
+    if not isinstance(stated, list):
+        return stated
+    ends = [one for one in stated if isinstance(one, int | float)]
+    if len(ends) == len(stated) == 2 and not ends[0] < ends[1]:
+        raise ValueError("bounds are the least and the largest value")
+    return tuple(None if one in (-math.inf, math.inf) else one for one in stated)
+
+
 @dataclass(frozen=True)
 class Unknown:
-    """Number to be identified.
+    """`[unknowns."PATH"]`: a number to be identified.
 
     Parameters
     ----------
@@ -35,8 +48,10 @@ class Unknown:
     """
 
     value: float
-    std: float | None = None
-    bounds: Bounds = (None, None)
+    std: Annotated[float, Field(gt=0)] | None = None
+    bounds: Annotated[
+        Bounds, BeforeValidator(_read_bounds, json_schema_input_type=tuple[float, float])
+    ] = (None, None)
     paths: Mapping[str, float] | Sequence[str] | None = None
 
     def get_factors(self, name: str) -> dict[str, float]:
@@ -132,7 +147,7 @@ def _require_sound(one: SoughtNumber) -> None:
         raise InputError(what, "give a positive number, or leave it out where nothing is known")
 
 
-def _bound(stated: float | None, fields: Sequence[tuple[Field, float]], side: int) -> float:
+def _bound(stated: float | None, fields: Sequence[tuple[ElementField, float]], side: int) -> float:
     """Return the bound of a value on one side: the stated one, or a limit of the fields over the
     factor there."""
     limits = [] if stated is None else [float(stated)]
@@ -151,13 +166,13 @@ _ASCII = str.maketrans({"·": "*", "²": "^2", "³": "^3"})
 """Spelling of the units of the parameter table."""
 
 
-def _get_unit(path: str, first: Field | None) -> str:
+def _get_unit(path: str, first: ElementField | None) -> str:
     if first is not None:
         return first.unit.translate(_ASCII) or "1"
     return "s" if path.startswith("delay.") else "1"
 
 
-def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> Field | None:
+def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> ElementField | None:
     """Return the field of the number at a path; None for a start or a delay."""
     head, *names = path.split(".")
     if head in ("start", "delay"):
@@ -167,8 +182,8 @@ def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> Field | Non
         hint = suggest_spelling(head, by_name)
         raise InputError(f"{path}: no element {head!r}{hint}", f"known are {', '.join(by_name)}")
     place: Any = by_name[head]
-    fields: Mapping[str, Field] = ELEMENT_FIELDS[str(place["type"])]
-    found: Field | None = None
+    fields: Mapping[str, ElementField] = ELEMENT_FIELDS[str(place["type"])]
+    found: ElementField | None = None
     for name in names:
         if isinstance(place, list | tuple):
             place = place[int(name)] if name.isdecimal() and int(name) < len(place) else None
@@ -202,7 +217,7 @@ def require_known_places(
             raise InputError(f"{path}: the model has no {what} {name!r}{hint}", f"known: {listed}")
 
 
-def _list_numbers(fields: Mapping[str, Field], place: Any) -> list[str]:
+def _list_numbers(fields: Mapping[str, ElementField], place: Any) -> list[str]:
     """List the fields of an element or group that hold numbers, or groups of them."""
     if not isinstance(place, Mapping):
         return []
