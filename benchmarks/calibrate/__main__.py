@@ -18,7 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,24 +55,19 @@ _HEAD = (
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem: its task, candidates of a finalist and of a generation, bounds of peak jerk.
-
-    The bounds are by quantile.
-    """
+    """A problem: its task, and bounds of peak jerk by quantile."""
 
     make: Callable[[CalibrationSettings, int], Task]
-    evaluations: int
-    population: int
     jerk: Mapping[float, float]
     locks_once: bool
 
 
 _PROBLEMS = {
-    PolicyKind.KNOTS: Problem(make_task, 8000, 24, {0.95: 50.0, 0.99: 60.0}, locks_once=False),
+    PolicyKind.KNOTS: Problem(make_task, {0.95: 50.0, 0.99: 60.0}, locks_once=False),
     PolicyKind.CONTROLLER: Problem(
-        make_controller_task, 8000, 24, {0.95: 50.0, 0.99: 60.0}, locks_once=False
+        make_controller_task, {0.95: 50.0, 0.99: 60.0}, locks_once=False
     ),
-    PolicyKind.SLIP: Problem(make_slip_task, 1440, 12, {0.95: 32.0, 0.995: 45.0}, locks_once=True),
+    PolicyKind.SLIP: Problem(make_slip_task, {0.95: 32.0, 0.995: 45.0}, locks_once=True),
 }
 
 
@@ -124,15 +119,10 @@ def list_failures(one: Entry, start: Entry, problem: Problem) -> list[str]:
     return [name for name, holds in checks.items() if not holds]
 
 
-def solve(problem: Problem, given: argparse.Namespace) -> list[str]:
+def solve(kind: PolicyKind, given: argparse.Namespace) -> list[str]:
     """Run all optimisers on a problem and print the table; return the bounds that are missed."""
-    settings = CalibrationSettings(
-        threads=1,
-        certificate_draws=FRESH,
-        starts=given.starts,
-        evaluations=given.evaluations or problem.evaluations,
-        population=problem.population,
-    )
+    problem, usual = _PROBLEMS[kind], CalibrationSettings.for_policy(kind)
+    settings = replace(usual, threads=1, certificate_draws=FRESH)
     task = problem.make(settings, given.seed)
     fresh = draw_scenarios(task.maneuver, task.draw, FRESH, CERTIFICATE_SEED, Purpose.CERTIFICATE)
     sys.stdout.write(f"| {' | '.join(_HEAD)} |\n|{'---|' * len(_HEAD)}\n")
@@ -157,8 +147,6 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("seed", type=int, nargs="?", default=1)
     parser.add_argument("--policy", type=PolicyKind, choices=list(_PROBLEMS))
-    parser.add_argument("--starts", type=int, default=CalibrationSettings.starts)
-    parser.add_argument("--evaluations", type=int)
     parser.add_argument("--against", action="append", choices=list(_OTHERS))
     parser.add_argument("--alone", action="store_true", help="without the other optimisers")
     given = parser.parse_args()
@@ -166,7 +154,7 @@ def main() -> int:
     missed = []
     for kind in chosen:
         sys.stdout.write(f"{kind}\n")
-        missed += solve(_PROBLEMS[kind], given)
+        missed += solve(kind, given)
     return 1 if missed else 0
 
 

@@ -70,13 +70,12 @@ _POLISHED, _POLISHES, _ITERATIONS = 128, 3, 6
 _LIGHT = CalibrationSettings(
     polish_draws=64,
     tail_draws=512,
-    tail_share=CalibrationSettings.search_share,
     check_draws=400,
     repairs=2,
     penalty=50.0,
     threads=1,
 )
-"""Settings with one objective in all stages.
+"""Settings with more draws in the last polish.
 
 The last polish has 512 draws: on 128 a policy of 17 free parameters is fitted to the draws, so that
 its tail mean is higher on others, and on true units.
@@ -171,7 +170,7 @@ def _compare(
         draw_true_units(made, task.maneuver, Spread(), count, seed)
         for seed, count in enumerate((_POLISHED, units))
     )
-    objective = Objective(task.limits, task.settings.search_share, weight)
+    objective = Objective(task.limits, task.settings.tail_share, weight)
     outcomes = [fresh.evaluate(task.policy.build_control(one)) for one in values]
     reached = [_assess(objective, one) for one in outcomes]
     best = []

@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,9 +50,8 @@ def try_vehicle(seed: int, effort: float) -> Trial:
     """Identify, calibrate and try one vehicle; print a line."""
     begin = time.process_time()
     made = make_vehicle(seed)
-    request = made.build_request(
-        PolicyKind.SLIP, CalibrationSettings(threads=1).scale_effort(effort)
-    )
+    settings = replace(CalibrationSettings.for_policy(PolicyKind.SLIP), threads=1)
+    request = made.build_request(PolicyKind.SLIP, settings.scale_effort(effort))
     found = calibrate(build_task(made.twin, request))
     promised = found.after.certificate.quantiles[Metric.PEAK_JERK].share_95
     shift = found.task.maneuver

@@ -14,6 +14,7 @@ import pytest
 
 from drivetwin.calibration.calibrate import polish_from
 from drivetwin.calibration.metrics import list_outputs
+from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
@@ -46,10 +47,7 @@ SHORT = ("--draws", "60", "--engine-torque", "1400")
 def effort() -> Iterator[None]:
     """Few candidates and draws in all tests."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "drivetwin.calibration.settings.CalibrationSettings",
-            lambda **given: replace(QUICK, **given),
-        )
+        patch.setattr(CalibrationSettings, "for_policy", lambda _: QUICK)
         yield
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.cli import main
 from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_file import load_twin, save_twin
@@ -23,10 +24,7 @@ from tests.calibration.twins import make_twin
 def effort() -> Iterator[None]:
     """Few candidates and draws in all tests."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "drivetwin.calibration.settings.CalibrationSettings",
-            lambda **given: replace(QUICK, **given),
-        )
+        patch.setattr(CalibrationSettings, "for_policy", lambda _: QUICK)
         yield
 
 

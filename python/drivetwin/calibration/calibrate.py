@@ -38,7 +38,7 @@ from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stag
 _COARSE = 2e-3
 """Sampling step [s] of the search."""
 _STAGES = TimedStages("calibration", ("search", "polish", "limits", "certificate"))
-_POLISH = TimedStages("polish", ("finalist", "tail"))
+_POLISH = TimedStages("polish", ("start", "tail"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +157,8 @@ def build_objective(task: Task, plant: Plant) -> Objective:
     settings, space = task.settings, Space(task.policy)
     draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
     start = plant.evaluate(space.build_control(space.start), draws)
-    comfort = compute_tail_mean(start.values[Metric.PEAK_JERK], settings.search_share)
-    whole = Objective(task.limits, settings.search_share, settings.penalty * comfort)
+    comfort = compute_tail_mean(start.values[Metric.PEAK_JERK], settings.tail_share)
+    whole = Objective(task.limits, settings.tail_share, settings.penalty * comfort)
     return whole.tighten([settings.margin] * len(task.limits))
 
 
@@ -189,31 +189,24 @@ def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
 def _polish(
     task: Task, plant: Plant, objective: Objective, found: Sequence[Candidate]
 ) -> FloatArray:
-    """Polish all finalists, then the best on more draws for its tail."""
+    """Polish all finalists, then the best of them on more draws.
+
+    The best are those of the least objective on these draws: few draws miss most second slips.
+    """
     settings = task.settings
     run = _make_run(task, plant, draw_for(task, settings.polish_draws, Purpose.POLISH))
-    polished, stages = [], _POLISH.repeat("finalist", len(found))
+    wider = _make_run(task, plant, draw_for(task, settings.tail_draws, Purpose.TAIL))
+    polished, stages = [], _POLISH.repeat("start", len(found))
     for number, one in enumerate(found):
-        with stages.enter("finalist", number=number):
-            polished.append(polish(run, one.coordinates, objective, settings.polish_iterations))
-    best = min(polished, key=lambda one: one.value)
-    tail = draw_for(task, settings.tail_draws, Purpose.TAIL)
+        with stages.enter("start", number=number):
+            at = polish(run, one.coordinates, objective, settings.polish_iterations).coordinates
+            polished.append(Candidate(at, objective.evaluate(wider([at])[0])))
+    finalists = sorted(polished, key=lambda one: one.value)[: settings.tail_finalists]
     with stages.enter("tail"):
-        improve = _make_tail_polish(task, plant, tail, settings.tail_iterations)
-        return improve(best.coordinates, objective)
-
-
-def _make_tail_polish(
-    task: Task, plant: Plant, draws: Scenarios, iterations: int
-) -> Callable[[FloatArray, Objective], FloatArray]:
-    """Return the function that polishes coordinates (q,) on draws for the tail of an objective."""
-    run = _make_run(task, plant, draws)
-
-    def improve(start: FloatArray, objective: Objective) -> FloatArray:
-        tail = objective.set_share(task.settings.tail_share)
-        return polish(run, start, tail, iterations).coordinates
-
-    return improve
+        last = [
+            polish(wider, one.coordinates, objective, settings.tail_iterations) for one in finalists
+        ]
+    return min(last, key=lambda one: one.value).coordinates
 
 
 def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArray) -> FloatArray:
@@ -239,8 +232,11 @@ def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArr
         return [one.excess for one in certificate.limits]
 
     held = Exchange(assess, exchange, settings.repairs).hold_lockup(found, objective)
-    wider = tail.join(draws.select(held.joined))
-    improve = _make_tail_polish(task, plant, wider, settings.repair_iterations)
+    wider = _make_run(task, plant, tail.join(draws.select(held.joined)))
+
+    def improve(at: FloatArray, objective: Objective) -> FloatArray:
+        return polish(wider, at, objective, settings.repair_iterations).coordinates
+
     repair = Repair(measure, improve, settings.repairs, settings.repair_weight)
     kept = repair.keep_limits(held.coordinates, objective)
     if kept.excess > TOLERANCE:

@@ -73,10 +73,6 @@ class Objective:
         excess = sum(float(one.compute_excess(outcome).mean()) for one in self.limits)
         return comfort + self.weight * (excess + float(outcome.relocked.mean()))
 
-    def set_share(self, share: float) -> Objective:
-        """Return the objective with another quantile."""
-        return replace(self, share=share)
-
     def tighten(self, margins: Sequence[float]) -> Objective:
         """Return the objective with bounds lower by relative `margins`, one for each limit."""
         limits = tuple(

@@ -4,22 +4,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
+
+from drivetwin.calibration.policies.kind import PolicyKind
 
 
 @dataclass(frozen=True)
 class CalibrationSettings:
     """Effort and tolerances of search, polish and certificate."""
 
-    starts: int = 4
+    starts: int = 8
     """Independent searches; the problem has many local minima. 0 polishes the start alone."""
-    finalists: int = 2
+    finalists: int = 8
     """Searches that are continued and polished."""
+    tail_finalists: int = 2
+    """Polished searches that are polished again on the draws for the tail."""
     population: int = 24
     """Candidates per generation."""
-    first_evaluations: int = 480
+    first_evaluations: int = 960
     """Candidates of each search before the finalists are chosen."""
-    evaluations: int = 1440
-    """Candidates of each finalist in all."""
+    evaluations: int = 960
+    """Candidates of each finalist in all. More gain little where polishes are cheap: the search
+    fits its few draws ever closer."""
     initial_step: float = 0.12
     """Standard deviation of the first generation, in shares of the ranges."""
     search_draws: int = 16
@@ -45,10 +51,9 @@ class CalibrationSettings:
     """Made units of each of these types."""
     promise_confidence: float = 0.9
     """Share of these types for which the promise holds."""
-    search_share: float = 0.9
-    """Quantile beyond which peak jerk is averaged in search and polish."""
-    tail_share: float = 0.98
-    """Quantile beyond which peak jerk is averaged in the last polish."""
+    tail_share: float = 0.9
+    """Quantile beyond which peak jerk is averaged. The mean beyond 90 % is the value of 95 % of the
+    units where the tail is even. A mean beyond 98 % lowers the worst units at the cost of that."""
     polish_iterations: int = 12
     """Largest number of linear programs of the polish."""
     tail_iterations: int = 8
@@ -69,6 +74,24 @@ class CalibrationSettings:
     """Confidence of the certificate."""
     threads: int = 0
     """Threads of the simulation; 0 takes all cores."""
+
+    @classmethod
+    def for_policy(cls, policy: PolicyKind) -> Self:
+        """Return the default settings of a policy.
+
+        A run behind actuators, task by task, takes several times as long as one of profiles: few
+        searches are polished, after more candidates.
+        """
+        if policy.commands_actuators:
+            return cls(
+                starts=4,
+                finalists=2,
+                tail_finalists=1,
+                population=12,
+                first_evaluations=480,
+                evaluations=1440,
+            )
+        return cls()
 
     def scale_effort(self, factor: float) -> CalibrationSettings:
         """Return settings whose search and polish are longer by `factor`."""
