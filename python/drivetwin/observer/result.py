@@ -33,10 +33,6 @@ class Band:
         """Upper end of the 95 % band."""
         return self.value + Z95 * self.std
 
-    def compute_coverage(self, truth: FloatArray) -> float:
-        """Share of the samples at which `truth` (n,) lies in the 95 % band."""
-        return float(np.mean((truth >= self.lower) & (truth <= self.upper)))
-
 
 @dataclass(frozen=True, eq=False)
 class Observation:

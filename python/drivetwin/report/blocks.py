@@ -210,8 +210,3 @@ def make_number(text: str, note: str = "", *, secondary: bool = False) -> Cell:
 def make_badge(text: str, tone: Tone, note: str = "") -> Cell:
     """Make the cell of a verdict, drawn as a coloured label."""
     return Cell(text, badge=True, tone=tone, note=note)
-
-
-def make_cells(*texts: str, number: bool = False) -> tuple[Cell, ...]:
-    """Plain cells of one row."""
-    return tuple(Cell(text, number=number) for text in texts)

@@ -390,10 +390,6 @@ class LoggedShift:
         """Simulate the shift by a twin; raises as `simulate_shift`."""
         return simulate_shift(twin, self.log, self.shift)
 
-    def rerun(self, before: Validation, twin: Twin) -> Validation:
-        """Simulate the shift by another twin, over the window of `before`."""
-        return rerun_shift(before, twin, self.log, twin.build_dual_clutch(self.shift))
-
     def get_period(self, role: str) -> float:
         """Usual time between two samples of a channel [s]."""
         return float(np.median(np.diff(self.log[role].time)))
