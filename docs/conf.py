@@ -10,6 +10,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from docutils.nodes import SkipNode
+from latex2mathml.converter import convert
+
 import drivetwin
 
 project = "drivetwin"
@@ -21,6 +24,11 @@ html_theme = "furo"
 html_title = "drivetwin"
 html_show_sourcelink = False
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = {"math"}  # a code host draws these blocks too
+html_math_renderer = "mathml"
+html_static_path = ["static"]
+html_css_files = ["math.css"]
 default_role = "code"
 smartquotes = False
 
@@ -32,6 +40,15 @@ suppress_warnings = ["ref.python"]  # a class has two homes: the package and its
 
 _LINK = re.compile(r"\]\(([\w./-]+)\.md\)")
 _LITERAL = re.compile(r"(`[^`]*`)")
+_GREEK_CAPITAL = re.compile("<mi>(&#x0039[1-9A-F];|&#x003A[0-9];)</mi>")
+_TEX_FORMS = (  # brackets that grow, and bars without the spaces of an operator
+    (r"\lvert", r"\left|"),
+    (r"\rvert", r"\right|"),
+    (r"\lVert", r"\left\|"),
+    (r"\rVert", r"\right\|"),
+    (r"\begin{bmatrix}", r"\left[\begin{matrix}"),
+    (r"\end{bmatrix}", r"\end{matrix}\right]"),
+)
 
 # Public names are imported on first use; autodoc lists what is there.
 for _name in drivetwin.__all__:
@@ -63,7 +80,28 @@ def escape_plain_text(
         lines.insert(0, "\\ ")
 
 
+def convert_equation(text: str, display: str) -> str:
+    """Convert an equation to MathML with upright Greek capitals, as TeX has them."""
+    for pair in _TEX_FORMS:
+        text = text.replace(*pair)
+    return _GREEK_CAPITAL.sub(r'<mi mathvariant="normal">\1</mi>', convert(text, display=display))
+
+
+def write_inline(page: Any, node: Any) -> None:
+    """Write an equation in a line as MathML."""
+    page.body.append(convert_equation(node.astext(), "inline"))
+    raise SkipNode
+
+
+def write_block(page: Any, node: Any) -> None:
+    """Write an equation on lines of its own as MathML."""
+    equation = convert_equation(node.astext(), "block")
+    page.body.append(f'<div class="math">{equation}</div>\n')
+    raise SkipNode
+
+
 def setup(app: Any) -> None:
     """Connect the hooks; the escape comes before napoleon formats the sections."""
+    app.add_html_math_renderer("mathml", (write_inline, None), (write_block, None))
     app.connect("source-read", add_navigation)
     app.connect("autodoc-process-docstring", escape_plain_text, priority=400)
