@@ -42,6 +42,7 @@ _LINK = re.compile(r"\]\(([\w./-]+)\.md\)")
 _LITERAL = re.compile(r"(`[^`]*`)")
 _GREEK_CAPITAL = re.compile("<mi>(&#x0039[1-9A-F];|&#x003A[0-9];)</mi>")
 _TEX_FORMS = (  # brackets that grow, and bars without the spaces of an operator
+    (r"\ln \lvert", r"\ln\,\left|"),
     (r"\lvert", r"\left|"),
     (r"\rvert", r"\right|"),
     (r"\lVert", r"\left\|"),
