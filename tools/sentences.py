@@ -21,7 +21,7 @@ _INDENTED = re.compile(r"(?:^|(?<=\n\n)) {4,}.*(?:\n {4,}.*)*", re.MULTILINE)
 _NO_PROSE = re.compile(r"^\s*(?:\||#|!\[|<!--).*$", re.MULTILINE)
 _ITEM = re.compile(r"^\s*(?:- |\d+\. )", re.MULTILINE)
 _LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
-_END = re.compile(r"(?<=[.?!])[\"*)]*\s+(?=[A-Z0-9`*$(\"\[μηΓΣ])")
+_END = re.compile(r"(?<=[.?!])[\"*)]*\s+(?=[A-Z0-9*(\"μη])")
 _ABBREVIATION = re.compile(r"\b(?:e\.g|i\.e|[Ee]qs?|vs|al)\.$")
 _WORD = re.compile(r"\w")
 
@@ -39,7 +39,7 @@ def split_sentences(text: str) -> Iterator[str]:
     text = _CODE.sub("\n\n", text)
     text = _INDENTED.sub("\n\n", text)
     text = _ITEM.sub("\n\n", _NO_PROSE.sub("\n\n", text))
-    text = _LINK.sub(r"\1", re.sub(r"\$[^$]+\$", "x", re.sub(r"`[^`]+`", "x", text)))
+    text = _LINK.sub(r"\1", re.sub(r"\$[^$]+\$", "X", re.sub(r"`[^`]+`", "X", text)))
     for paragraph in re.split(r"\n\s*\n", text):
         start = ""
         for part in _END.split(" ".join(paragraph.split())):

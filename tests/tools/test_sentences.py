@@ -28,7 +28,7 @@ x = 1  # Nor is this. At all.
 def test_sentences_are_those_of_the_prose() -> None:
     assert list(split_sentences(PAGE)) == [
         "The first sentence, by eq. 3, ends here.",
-        "The second has x, a link and x.",
+        "The second has X, a link and X.",
         "An item without an end",
         "Another.",
         "With two.",
