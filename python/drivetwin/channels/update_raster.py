@@ -24,48 +24,18 @@ from drivetwin._util.arrays import (
     is_time_axis,
     remember_for_arrays,
 )
-
-MIN_CHANGES = 10
-"""Fewer changes of value cannot prove a raster."""
-
-USUAL_PERIODS = (0.1, 0.05, 0.04, 0.025, 0.02, 0.0125, 0.01, 0.005)
-"""Periods of senders [s] that are looked for where they are no multiple of the logger's step."""
-
-MAX_PERIOD = 0.25
-"""Longest update period looked for [s]; CAN messages of interest come every 5 to 100 ms."""
-
-_JITTER = 0.2
-"""Largest distance of a change from the raster, as a share of the period ..."""
-
-_JITTER_SAMPLES = 1.5
-"""... and in samples of the logger, unless chance would not put so many so near."""
-
-_SAME_BEAT = 1.5
-"""Ratio of periods within which they rival for the same changes: half a period fits as well."""
-
-_LEAST_STEPS = 2.1
-"""Steps of the logger in a period that it does not divide: in fewer the updates cannot be counted
-from change to change."""
-
-_BETWEEN_JITTER = 0.1
-"""Largest distance of such an update from the raster, as a share of the period, in addition to the
-uncertainty from the logger's step."""
+from drivetwin.channels.change_evidence import ChangeRaster, find_change_raster, find_changes
 
 _UNEVEN = 0.02
 """Part of a step that a period may have over a number of whole ones and count as divided by it: the
 clocks of sender and logger differ by less."""
 
-_LOST = 2.5
-"""Pause in steps from which on samples are missing."""
-
 _IN_TIME = 0.05
 """Share of updates that are taken to be shown as they come; the earliest of all may be jitter."""
 
-_CHANCE = 1e-6
-"""Probability from which on chance may have put all changes near such a raster."""
-
 _PAUSE = 1.5
-"""After more than so many steps without a sample the arrival of a value is unknown."""
+"""After more than so many steps without a sample the arrival of a value is unknown: a sample is
+missing."""
 
 
 @dataclass(frozen=True)
@@ -85,51 +55,24 @@ class UpdateRaster:
 def find_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
     """Return the update raster of a held channel; None where each sample may be an update.
 
-    The period is the longest one, up to the shortest distance of two changes, on which all changes
-    lie, of those near it the one to which they lie nearest; start and period are fitted by least
-    squares so that clock drift does not add up. Where stamps jitter or messages are lost, it is the
-    distance that most changes have.
+    The raster is the likeliest one; start and period are fitted by least squares so that clock
+    drift does not add up. Where the clock of the sender wanders it has the period alone.
     """
-    if time.size <= MIN_CHANGES or not is_time_axis(time):
+    if not is_time_axis(time):
         return None
-    raster = _find_stamp_raster(time, values)
-    if raster is None:
-        period = estimate_repeat_period(time, values)
-        raster = None if period is None else UpdateRaster(float(time[0]), period)
-    return raster
+    found = _find_hold(time, values)
+    if found is None:
+        return None
+    if found.loose:
+        return UpdateRaster(float(time[0]), found.period)
+    return _make_raster(found, _find_clock(time))
 
 
 @remember_for_arrays
-def _find_stamp_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
-    """Find the raster by the stamps; None if there is none."""
-    changes = time[1:][_find_changes(time, values)]
-    if changes.size < MIN_CHANGES:
-        return None
-    step, shortest = _mean_step(time), float(np.diff(changes).min())
-    longest = min(shortest * (1.0 + _JITTER), MAX_PERIOD)
-    whole = [(samples * step, _fit_raster) for samples in range(round(longest / step), 1, -1)]
-    between = [
-        (period, _fit_off_grid)
-        for period in USUAL_PERIODS
-        if _LEAST_STEPS * step < period < shortest + step + _BETWEEN_JITTER * period
-        and _is_off_grid(period, step)
-    ]
-    best, least = None, 0.0
-    for period, fit in sorted(whole + between, key=lambda one: -one[0]):
-        if period < least:
-            break
-        raster = fit(changes, period, step)
-        if raster is not None and (best is None or raster.spread < best.spread):
-            least = raster.period / _SAME_BEAT if best is None else least
-            best = raster
-    return best
-
-
-@remember_for_arrays
-def _mean_step(time: FloatArray) -> float:
-    """Compute the mean sample interval [s] without pauses: jitter of stamps moves a median."""
-    steps = np.diff(time)
-    return float(np.mean(steps[steps < _LOST * compute_median_step(time)]))
+def _find_hold(time: FloatArray, values: FloatArray) -> ChangeRaster | None:
+    """Find the raster on which the values change; None where each sample may be an update."""
+    changes = find_changes(time, values)
+    return find_change_raster(changes)
 
 
 def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
@@ -143,41 +86,21 @@ def _follow_at_once(time: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(np.diff(time) <= _PAUSE * compute_median_step(time))
 
 
-def _fit_raster(changes: FloatArray, period: float, step: float) -> UpdateRaster | None:
-    """Fit a raster near `period` by least squares; None if the changes do not lie on one."""
-    found = _fit_line(changes, period)
-    if found is None:
+def _find_clock(time: FloatArray) -> float | None:
+    """Return the step [s] of a logger that samples by a clock; None for stamps of messages."""
+    rows = np.diff(time) / compute_median_step(time)
+    whole = np.round(rows)
+    if np.abs(rows - whole).max() > _UNEVEN:
         return None
-    start, slope, late = found
-    most = float(np.abs(late).max())
-    surely = most <= _JITTER_SAMPLES * step or _is_significant(_JITTER * slope, slope, changes.size)
-    if most > _JITTER * slope or not surely or slope <= 1.5 * step:
-        return None
-    return _make_raster(start, slope, step, late)
+    return float((time[-1] - time[0]) / np.sum(whole))
 
 
-def _fit_off_grid(changes: FloatArray, period: float, step: float) -> UpdateRaster | None:
-    """Fit a raster whose period the step does not divide: changes show up to a step late."""
-    found = _fit_line(changes, period)
-    if found is None:
-        return None
-    start, slope, late = found
-    most = 0.5 * step + _BETWEEN_JITTER * period
-    as_usual = abs(slope - period) < 0.01 * period
-    if np.abs(late).max() > most or not _is_significant(most, period, changes.size) or not as_usual:
-        return None
-    return _make_raster(start, slope, step, late)
-
-
-def _make_raster(start: float, period: float, step: float, late: FloatArray) -> UpdateRaster:
-    """Build the raster after which changes come `late` [s] (n,)."""
-    spread = float(np.sqrt(np.mean(late**2)))
-    return UpdateRaster(start, period, _estimate_lead(period, step, late), spread)
-
-
-def _is_significant(most: float, period: float, changes: int) -> bool:
-    """Return True if chance hardly puts so many changes within `most` [s] of a raster."""
-    return (2.0 * most / period) ** (changes - 2) < _CHANCE
+def _make_raster(found: ChangeRaster, step: float | None) -> UpdateRaster:
+    """Build the raster of the rows that show updates."""
+    middle = float(np.mean(found.late))
+    late = found.late - middle
+    lead = 0.0 if step is None else _estimate_lead(found.period, step, late)
+    return UpdateRaster(found.start + middle, found.period, lead, float(np.std(late)))
 
 
 def _estimate_lead(period: float, step: float, late: FloatArray) -> float:
@@ -193,19 +116,6 @@ def _is_off_grid(period: float, step: float) -> bool:
     """Return True if the step does not divide the period."""
     steps = period / step
     return abs(steps - round(steps)) > _UNEVEN
-
-
-def _fit_line(changes: FloatArray, period: float) -> tuple[float, float, FloatArray] | None:
-    """Fit start and period of the raster near `period`, and the residual of each change (n,).
-
-    None if two changes are closer than a period.
-    """
-    steps = np.round(np.diff(changes) / period)
-    if steps.min() < 1.0:
-        return None
-    count = np.concatenate(([0.0], np.cumsum(steps)))
-    slope, start = np.polyfit(count, changes, 1)
-    return float(start), float(slope), np.asarray(changes - start - slope * count)
 
 
 def _match_updates(
@@ -247,90 +157,17 @@ def find_updates(
     The value at such an instant is the newest the sender had; nothing is interpolated. Where the
     updates fall between the logger's samples, the instants are those of the raster.
     """
-    raster = _find_stamp_raster(time, values)
-    if raster is not None:
+    raster = find_raster(time, values)
+    if raster is None:
+        return None
+    found = _find_hold(time, values)
+    if found is not None and not found.loose and np.all(np.diff(found.count) > 0.0):
         fresh, count = _match_updates(time, values, raster)
         if raster.early > 0.0:
             return raster.start - raster.early + raster.period * count, fresh
         return time[fresh], fresh
-    period = estimate_repeat_period(time, values)
-    if period is None:
-        return None
-    fresh = count_updates(time, values, period)
+    fresh = count_updates(time, values, raster.period)
     return time[fresh], fresh
-
-
-_LEAST = 30
-"""Least number of changes from which a period is estimated."""
-
-
-_EVEN = 0.02
-"""Part of a step by which stamps may differ and still show a raster if there is one."""
-
-
-_NEAR = 0.6
-"""Steps within which a distance of changes is the usual one ..."""
-
-
-_NEAR_PART = 0.25
-"""... or, on even stamps, this part of it."""
-
-
-_MOST = 0.5
-"""Least share of changes at the usual distance."""
-
-
-_CLOSE = 1.5
-"""Steps below which two changes are nearer than a repeated value has them ..."""
-
-
-_SELDOM = 0.25
-"""... but for so many whose first message was lost."""
-
-
-_CLOSE_PART = 0.5
-"""Like `_CLOSE` as a part of the usual distance, on even stamps."""
-
-
-_STAIRS = 1.5
-"""Times the least of all changes above which one is no stair of a rounded signal ..."""
-
-
-_NEXT = 1.5
-"""Steps below which a change follows the one before; if most do, each sample may be an update."""
-
-
-_LARGER = 0.2
-"""... and the least share of such among changes at the usual distance: a signal that is not held
-goes stair by stair where it does not change with each sample."""
-
-
-@remember_for_arrays
-def estimate_repeat_period(time: FloatArray, values: FloatArray) -> float | None:
-    """Estimate the period [s] at which repeated values are updated.
-
-    None where each sample may be an update. On even stamps, where changes do jitter, those of a
-    rounded signal may seem to be updates: there some must be larger than a step of the rounding.
-    """
-    changed = np.flatnonzero(values[1:] != values[:-1]) + 1
-    if changed.size < _LEAST:
-        return None
-    step = compute_median_step(time)
-    apart = np.maximum(np.diff(changed), np.diff(time[changed]) / step)
-    if 2 * np.count_nonzero(apart < _NEXT) > apart.size:
-        return None
-    usual = round(float(np.median(apart)))
-    near, close, least = _NEAR, _CLOSE, 0.0
-    if np.abs(np.diff(time) / step - 1.0).max() < _EVEN:
-        near, close = max(near, _NEAR_PART * usual), max(close, _CLOSE_PART * usual)
-        least = _LARGER
-    at_usual = np.abs(apart - usual) < near
-    often = np.mean(at_usual) > _MOST and np.mean(apart < close) < _SELDOM
-    if usual <= 1 or not often:
-        return None
-    size = np.abs(np.diff(values))[changed - 1]
-    larger = np.mean(size[1:][at_usual] > _STAIRS * size.min())
-    return usual * step if larger >= least else None
 
 
 def count_updates(time: FloatArray, values: FloatArray, period: float) -> NDArray[np.intp]:
