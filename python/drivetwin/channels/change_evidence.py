@@ -40,7 +40,7 @@ _PRICE_OF_INSTANTS, _PRICE_OF_REPEATS = 2.5, 0.5
 """Logarithm of the number of changes by which the likelihood of a raster falls for its unknowns
 (Schwarz 1978): a half each beyond the two of a measured signal, a half of three for the period."""
 _EXACT = 1e-3
-"""Jitter over the period that counts as none."""
+"""Jitter over the distance of rows that counts as none."""
 _LEAST_SHARE = 1e-4
 """Least share of changes that a model expects of any sort: a log has no more to exclude them."""
 
@@ -137,13 +137,16 @@ def _list_repeats(changes: Changes) -> list[int]:
 
 
 def _fit_best(changes: Changes, repeats: int) -> ChangeRaster | None:
-    """Return the likelier raster of about so many rows; None where the changes show none."""
+    """Return the likelier raster of about so many rows; None where the changes show none.
+
+    Senders have a clock; that one has none needs as much evidence as a raster itself.
+    """
     usual = np.diff(changes.time)[np.diff(changes.rows) == repeats]
     if not usual.size:
         return None
     step = float(np.median(usual)) / repeats
     tight, loose = _fit_instants(changes, repeats, step), _fit_repeats(changes, repeats, step)
-    return loose if tight is None or loose.likelihood > tight.likelihood else tight
+    return loose if tight is None or loose.likelihood - tight.likelihood > PRIOR else tight
 
 
 def _fit_instants(changes: Changes, repeats: int, step: float) -> ChangeRaster | None:
@@ -232,7 +235,8 @@ def _weigh(
 
     scaleless = 1.0 / (rows * np.log(np.sum(rows) + 2.0))
     stray = hidden = 0.1
-    jitter = float(np.clip(np.sqrt(np.mean(off**2)), _EXACT, most))
+    least = _EXACT * float(np.median(width))
+    jitter = float(np.clip(np.sqrt(np.mean(off**2)), least, most))
     total = -np.inf
     for _ in range(_ROUNDS):
         inside = ndtr((off + 0.5 * width) / jitter) - ndtr((off - 0.5 * width) / jitter)
@@ -244,7 +248,7 @@ def _weigh(
             break
         weight = (1.0 - stray) * often / likely + 1e-12
         stray = max(1.0 - float(np.mean(weight)), _LEAST_SHARE)
-        jitter = float(np.clip(np.sqrt(np.average(off**2, weights=weight)), _EXACT, most))
+        jitter = float(np.clip(np.sqrt(np.average(off**2, weights=weight)), least, most))
         missed = float(np.average(more, weights=weight))
         hidden = max(missed / (1.0 + missed), _LEAST_SHARE)
     return total

@@ -197,7 +197,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_mode_of_speeds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     posed, _, best = _without_torque()
-    monkeypatch.setattr(of_signals, "EITHER_MODE", np.inf)
+    monkeypatch.setattr(of_signals, "TIE", np.inf)
     wide, doubts = widen_over_modes(posed, best)
     other = fit_local(posed.select_modes(frozenset(SPEEDS)), best.point)
     assert other is not None
@@ -205,7 +205,7 @@ def test_without_an_output_torque_the_interval_reaches_the_other_mode_of_speeds(
     assert far == pytest.approx(0.5e-3, rel=0.3)  # half a period of the speeds
     assert far < 1.96 * _get_delay(wide)[1]
     assert "engine speed" in doubts[0].text
-    monkeypatch.setattr(of_signals, "EITHER_MODE", -np.inf)
+    monkeypatch.setattr(of_signals, "TIE", -np.inf)
     assert widen_over_modes(posed, best) == (best, [])
 
 

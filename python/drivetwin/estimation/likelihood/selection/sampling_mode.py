@@ -31,6 +31,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
+from drivetwin.estimation.likelihood.coloured_noise import compute_block_means, split_whitened
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
@@ -62,11 +63,6 @@ deviations of its delay."""
 TIE = 6.0
 """Rise of the same below which the 95 % interval reaches the minimum of the other mode,
 whatever its weight: odds of 20."""
-EITHER_MODE = 20.0
-"""Rise of the deviance below which outputs that lie `_far_apart` may be of the other mode. Half
-their period is nearly a delay of the engine torque; noise about P0, and how the values of
-a torque are joined, which no model has quite, have been seen to speak for the wrong mode by 10, and
-Q alone by 17."""
 UNLIKELY = 0.01
 """Weight of a mode below which it is not fitted."""
 MATTERS = 0.5
@@ -209,8 +205,8 @@ def widen_over_modes(
     problem: ShiftObjective, best: LikelihoodFit
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with its covariance widened up to the minimum that has the outputs which lie
-    `_far_apart` of the other mode, and a finding; as it is where the deviance rises much to
-    there."""
+    `_far_apart` of the other mode, and a finding; as it is where the deviance rises to there by
+    more than a tie of both, and than its spread over logs explains."""
     outputs = _far_apart(problem) & _shown(problem)
     if not outputs:
         return best, []
@@ -222,7 +218,10 @@ def widen_over_modes(
     except BudgetExceeded:  # nobody knows: what shows the same may be as good
         far = start.values - best.point.values
     else:
-        if other is None or _rise(problem, best, other) > EITHER_MODE:
+        if other is None:
+            return best, []
+        by_chance = Z95 * _estimate_rise_std(best, other)
+        if _rise(problem, best, other) > TIE + by_chance:
             return best, []
         far = other.point.values - best.point.values
     names = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in outputs)
@@ -292,6 +291,25 @@ def _rise(problem: ShiftObjective, one: LikelihoodFit, other: LikelihoodFit) -> 
     if _shown(problem) <= modes ^ others:
         return other.deviance - one.deviance + prices
     return other.normal.cost - one.normal.cost + prices
+
+
+def _estimate_rise_std(one: LikelihoodFit, other: LikelihoodFit) -> float:
+    """Estimate the standard deviation of the rise of Q from `one` to the `other` fit.
+
+    That is the sum over the samples of what each adds, whose spread shows by how much another log
+    of the same shifts would differ, whatever both models lack (Vuong 1989). Neighbours depend on
+    each other, so that it is taken over the blocks of slow errors.
+    """
+    power = 0.0
+    pairs = (zip(fit.problem.terms, fit.normal.residuals, strict=True) for fit in (one, other))
+    for (term, mine), (against, its) in zip(*pairs, strict=True):
+        rise = its * against.weighting.apply_inverse(its) - mine * term.weighting.apply_inverse(
+            mine
+        )
+        for out, rows, _ in split_whitened(term, mine):
+            _, means = compute_block_means(term.record.time[out.place], rise[rows])
+            power += out.values.size * float(np.var(means))
+    return float(np.sqrt(power))
 
 
 def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[Finding]:
