@@ -33,9 +33,12 @@ def clutch(name: str, a: str, b: str, gain: float) -> Element:
     return build_element("clutch", name, a=a, b=b, **law, pressure=f"P {name}", drum_inertia=0.0)
 
 
-def hybrid(*, shaft: bool) -> list[Element]:
-    """A hybrid whose K0 starts the engine while K1 slips, of more than 4 states with a shaft."""
-    out = "gearbox" if shaft else "vehicle"
+def hybrid(*, shaft: bool, tyre: bool = False) -> list[Element]:
+    """A hybrid whose K0 starts the engine while K1 slips, of more than 4 states with a shaft.
+
+    A tyre in place of the shaft has no propagators.
+    """
+    out = "gearbox" if shaft or tyre else "vehicle"
     elements = [
         build_element("inertia", "engine", node="crank", inertia=0.18),
         build_element("torque", "drag", node="crank", input="T engine"),
@@ -48,9 +51,13 @@ def hybrid(*, shaft: bool) -> list[Element]:
             "road_load", "load", node="vehicle", constant=20.0, rolling=0.0, aero=1e-4
         ),
     ]  # fmt: skip
+    if shaft or tyre:
+        elements.append(build_element("inertia", "gearbox", node="gearbox", inertia=0.04))
+    if tyre:
+        slip = {"slip_stiffness": 2e4, "least_speed": 0.5}
+        elements.append(build_element("tyre", "tyre", a="gearbox", b="vehicle", **slip))
     if shaft:
         elements += [
-            build_element("inertia", "gearbox", node="gearbox", inertia=0.04),
             build_element(
                 "spring_damper", "axle", a="gearbox", b="vehicle", stiffness=9e3, damping=6.0
             ),
@@ -58,14 +65,19 @@ def hybrid(*, shaft: bool) -> list[Element]:
     return elements
 
 
-def scenario(*, shaft: bool, seed: int = 0) -> NetworkScenario:
+def scenario(*, shaft: bool, tyre: bool = False, seed: int = 0) -> NetworkScenario:
     """K0 engages from 0.1 s on."""
     rng = np.random.default_rng(seed)
     pressure = np.interp(TIME, [0.0, 0.1, 0.3, 0.9], [0.0, 1e5, 4e5, 1.2e6])
     torque = np.interp(TIME, [0.0, 0.6, 0.7], [-12.0, -12.0, 60.0]) + rng.standard_normal(TIME.size)
     values = {"P K0": pressure, "P K1": np.full(TIME.size, 9e5), "T engine": torque}
     values["T motor"] = np.full(TIME.size, 90.0)
-    speeds = {"crank": 0.0, "rotor": 95.0, "vehicle": 90.0, **({"gearbox": 90.0} if shaft else {})}
+    speeds = {
+        "crank": 0.0,
+        "rotor": 95.0,
+        "vehicle": 90.0,
+        **({"gearbox": 90.0} if shaft or tyre else {}),
+    }
     inputs = {name: Signal(TIME, column) for name, column in values.items()}
     return NetworkScenario(inputs, Start(speeds, {"axle": 0.002} if shaft else {}))
 
@@ -96,10 +108,13 @@ def change(elements: list[Element], start: Start, values: dict[str, float]) -> A
 OUTPUTS: list[Output] = [("speed", "crank"), ("slip", "K1"), ("friction_torque", "K0")]
 
 
-@pytest.mark.parametrize("shaft", [False, True])
+@pytest.mark.parametrize(("shaft", "tyre"), [(False, False), (True, False), (False, True)])
 @pytest.mark.parametrize("threads", [1, 2, 3])
-def test_runs_are_what_each_is_alone_on_any_number_of_threads(shaft: bool, threads: int) -> None:
-    given, elements, values = scenario(shaft=shaft), hybrid(shaft=shaft), sets(11)
+def test_runs_are_what_each_is_alone_on_any_number_of_threads(
+    shaft: bool, tyre: bool, threads: int
+) -> None:
+    given, elements = scenario(shaft=shaft, tyre=tyre), hybrid(shaft=shaft, tyre=tyre)
+    values = sets(11)
     batch = simulate_network_batch(elements, [given], TIME, OUTPUTS, values, threads=threads)
     assert not batch.failed
     for i in range(11):

@@ -9,8 +9,8 @@ use crate::model::Name;
 use crate::network::{CompileError, Mode, ModeKey, Network};
 use crate::number::{Number, Real};
 use crate::solver::{
-    InputError, Inputs, Integrator, MAX_LOCKSTEP_STATES, MAX_SPECTRAL_STEP_SLIPPING, Settings,
-    Signal, SolverCache, Status, supports_fixed_step,
+    InputError, Inputs, Integrator, MAX_SPECTRAL_STEP_SLIPPING, Settings, Signal, SolverCache,
+    Status, supports_fixed_step, supports_lockstep,
 };
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -94,8 +94,8 @@ impl<T: Real> Plan<T> {
         let inputs = if fine && slips { divided(network, inputs) } else { inputs };
         let points = inputs.points(grid);
         let settings = Settings { exponential_steps: sprint && points.is_some(), ..settings };
-        let few = network.states() <= MAX_LOCKSTEP_STATES;
-        let lockstep = few && fine && settings.exponential_steps && inputs.is_sampled();
+        let together = supports_lockstep(network) && signals.iter().all(sampled);
+        let lockstep = together && settings.exponential_steps && inputs.is_sampled();
         let (grid, outputs) = (grid.to_vec(), outputs.to_vec());
         let inputs = Arc::new(inputs);
         Ok(Self { inputs, grid, points, outputs, targets, settings, audit, lockstep })

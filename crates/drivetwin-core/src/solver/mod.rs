@@ -28,7 +28,7 @@ mod whitening;
 
 pub use banded::BandedFactor;
 pub use cache::SolverCache;
-pub use exponential::plan::{MAX_LOCKSTEP_STATES, supports_fixed_step};
+pub use exponential::plan::{supports_fixed_step, supports_lockstep};
 pub use exponential::samples::{BLOCK, Samples};
 pub use hybrid::event::{Event, EventKind, FrictionState};
 pub use hybrid::state::HybridState;

@@ -16,8 +16,10 @@ use crate::solver::sine::Wave;
 use crate::solver::tolerances::TORQUE_ATOL;
 use std::sync::Arc;
 
-/// Most states of runs side by side, those of drivelines of two clutches.
-pub const MAX_LOCKSTEP_STATES: usize = 4;
+/// Most states of runs side by side that propagators pass, those of drivelines of two clutches.
+const MAX_LOCKSTEP_STATES: usize = 4;
+/// Most states of runs side by side that are expanded throughout: one step fills the nearest cache.
+const MAX_EXPANDED_STATES: usize = 8;
 
 /// Most states of a network over `T` that is marched. With derivatives the gain with more does not pay for the
 /// code.
@@ -33,13 +35,32 @@ const fn max_states<T: KernelFloat>() -> usize {
 
 /// Return true if propagators can pass the samples of a network.
 pub fn supports_fixed_step<T: Number>(network: &Network<T>) -> bool {
-    let smooth = |channel: &NonlinearTorque<T>| {
-        matches!(channel.law, TorqueLaw::Friction { .. } | TorqueLaw::Quadratic(_))
-    };
     network.states() <= max_states::<T>()
         && network.prescribed.is_empty()
         && network.mechanism.inputs.len() <= MAX_INPUTS
-        && network.channels.iter().all(smooth)
+        && network.channels.iter().all(propagated)
+}
+
+/// Return true if operators carry the law of a channel.
+fn propagated<T: Number>(channel: &NonlinearTorque<T>) -> bool {
+    matches!(channel.law, TorqueLaw::Friction { .. } | TorqueLaw::Quadratic(_))
+}
+
+/// Return true if several runs of a network can go side by side: by propagators, or by expansions
+/// throughout where a tyre has none. Pieces of a table have none either, but runs leave them at times of
+/// their own, and would part.
+pub fn supports_lockstep<T: Number>(network: &Network<T>) -> bool {
+    let analytic = |channel: &NonlinearTorque<T>| {
+        propagated(channel) || matches!(channel.law, TorqueLaw::Slip { .. })
+    };
+    if supports_fixed_step(network) {
+        return network.states() <= MAX_LOCKSTEP_STATES;
+    }
+    network.states() <= MAX_EXPANDED_STATES
+        && network.prescribed.is_empty()
+        && network.massless.is_empty()
+        && network.table_losses.is_empty()
+        && network.channels.iter().all(analytic)
 }
 
 /// Things that operators are built for, beside the mode.

@@ -8,7 +8,7 @@
 
 use crate::number::{KernelFloat, Number, Series, TERMS, Values, with_consensus};
 use crate::solver::cache::SolverCache;
-use crate::solver::exponential::plan::supports_fixed_step;
+use crate::solver::exponential::plan::{supports_fixed_step, supports_lockstep};
 use crate::solver::exponential::propagator::MAX_ACTIVE;
 use crate::solver::exponential::propagator_cache::{PropagatorCache, SizedPropagator};
 use crate::solver::exponential::samples::SampleColumn;
@@ -29,6 +29,8 @@ struct LockstepBatch<'a> {
     state: HybridState<'a, Lanes>,
     propagators: PropagatorCache<Lanes>,
     settings: Settings,
+    /// True if propagators pass whole samples.
+    uses_fixed_step: bool,
     lanes: Vec<LaneRun<'a>>,
     /// Events of those that have come to their end.
     events: Vec<Option<Vec<Event<f64>>>>,
@@ -50,9 +52,10 @@ pub fn run_lockstep<'a>(
     record: &mut impl LaneSink,
 ) -> Vec<Option<Vec<Event<f64>>>> {
     let events = vec![None; inputs.len()];
-    if !settings.exponential_steps || !supports_fixed_step(cache.network) {
+    if !settings.exponential_steps || !supports_lockstep(cache.network) {
         return events;
     }
+    let uses_fixed_step = supports_fixed_step(cache.network);
     let SolverCache { network, modes, propagators } = cache;
     let start = inputs[0].knot(0);
     let (state, diverged_mask) =
@@ -72,8 +75,16 @@ pub fn run_lockstep<'a>(
     let lanes = inputs.iter().enumerate().map(lane).collect();
     let own_inputs = vec![[0.0; TERMS]; state.inputs_plus.len()];
     let columns = Vec::with_capacity(state.x.len() + MAX_ACTIVE);
-    let mut all =
-        LockstepBatch { state, propagators, settings, lanes, events, columns, own_inputs };
+    let mut all = LockstepBatch {
+        state,
+        propagators,
+        settings,
+        uses_fixed_step,
+        lanes,
+        events,
+        columns,
+        own_inputs,
+    };
     all.evict(diverged_mask);
     all.decide(all.open(), |state| state.engage_initial(locked));
     while all.open() != 0 && !is_interrupted() {
@@ -201,6 +212,10 @@ impl LockstepBatch<'_> {
         let Some(first) = lanes_in(ahead).map(|run| self.lanes[run].segment).min() else {
             return false;
         };
+        if !self.uses_fixed_step {
+            lanes_in(ahead).for_each(|run| self.lanes[run].status = LaneStatus::NeedsTaylorStep);
+            return false;
+        }
         let h = self.lanes[0].inputs.usual_length(first, self.settings.max_step);
         let (plan, diverged_mask) =
             with_consensus(self.open(), || self.state.plan_steps(&mut self.propagators, &[], h?));
@@ -247,7 +262,7 @@ impl LockstepBatch<'_> {
         let none = Lanes::zero_();
         let remaining = none.replace_where(runs, self.state.remaining);
         let wish = remaining.smaller(Lanes::of(self.settings.max_step));
-        let accuracy = self.settings.accuracy(true);
+        let accuracy = self.settings.accuracy(self.uses_fixed_step);
         let ((h, events), diverged_mask) = with_consensus(runs, || {
             let h = self.state.expand(runs, wish, accuracy);
             (h, earliest_per_lane(&self.state, runs, h))
