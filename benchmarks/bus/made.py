@@ -60,13 +60,13 @@ class Vehicle:
 
     def compute_swing(self, ratio: float) -> tuple[float, float]:
         """Frequency [Hz] and damping ratio in a gear."""
-        before = self.J_e * self.eta * ratio**2 + _J_OUT
+        before = self.J_e * self.eta * ratio**2 + J_OUT
         series = before * self.J_v / (before + self.J_v)
         rate, square = self.c / (2.0 * series), self.k / series
         return float(np.sqrt(square - rate**2) / (2.0 * np.pi)), float(rate / np.sqrt(square))
 
 
-_J_OUT = 0.05
+J_OUT = 0.05
 """Inertia of the output side before the shaft [kg m^2]."""
 
 
@@ -77,7 +77,7 @@ def draw_vehicle(rng: np.random.Generator) -> Vehicle:
     chosen = tuple(float(one) for one in ratios[first : first + 3])
     J_e, J_v, eta = rng.uniform(0.6, 2.5), rng.uniform(60.0, 400.0), rng.uniform(0.9, 0.97)
     frequency, damping = rng.uniform(2.5, 5.0), rng.uniform(0.04, 0.12)
-    before = J_e * eta * chosen[1] ** 2 + _J_OUT
+    before = J_e * eta * chosen[1] ** 2 + J_OUT
     series = before * J_v / (before + J_v)
     k = series * (2.0 * np.pi * frequency) ** 2
     reference = float(rng.choice([650.0, 1100.0, 1600.0]))
@@ -157,7 +157,7 @@ def _build_model(vehicle: Vehicle, old: float, new: float, load: float) -> DualC
         eta=vehicle.eta,
         loss_law="paper",
         i_in=1.0,
-        J_out=_J_OUT,
+        J_out=J_OUT,
         i_f=1.0,
         J_v=vehicle.J_v,
         k_o=vehicle.k,

@@ -28,7 +28,6 @@ from drivetwin.bus.decay import (
 from drivetwin.bus.phases import BusShift, Timeline, estimate_ratios, find_timeline
 from drivetwin.bus.quantities import (
     DAMPING,
-    DEAD_TIME,
     DELAY,
     FREQUENCY,
     RATIO,
@@ -40,7 +39,7 @@ from drivetwin.bus.quantities import (
 from drivetwin.bus.recording import BusLog, prepare_bus_log
 from drivetwin.bus.scatter import Combined, combine
 from drivetwin.bus.torque import TorqueBalance
-from drivetwin.bus.torque_estimates import estimate_torques
+from drivetwin.bus.torque_estimates import estimate_torques, find_dead_time
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
 from drivetwin.estimation.linear.ringdown import RING_DOWN
@@ -108,11 +107,10 @@ def identify_bus(
     made = _Maker(ratios, card)
     made.add_alignment(aligned)
     made.add_decays(_collect_decays(timelines))
-    torques = estimate_torques(timelines, ratios, late, made.decays, card)
-    dead = torques.estimates[DEAD_TIME].value
+    dead = find_dead_time(timelines, ratios, late, made.decays)
     if dead is not None:  # the torque drives the oscillation of the decays too
         made.add_decays(_collect_decays(timelines, dead))
-        torques = estimate_torques(timelines, ratios, late, made.decays, card)
+    torques = estimate_torques(timelines, ratios, late, made.decays, card)
     made.report_decays()
     made.estimates |= torques.estimates
     made.findings += torques.findings

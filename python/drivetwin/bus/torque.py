@@ -169,7 +169,8 @@ def _balance(
     size = 3 if with_offset else 2
     trials = np.arange(-0.2, 1.21, 0.05) * TORQUE.oldest if late is None else [late]
     tried = [(_pool(spans, float(one), size), float(one)) for one in trials]
-    (_, scale), late = min(tried, key=lambda one: one[0][0])
+    pooled, late = min(tried, key=lambda one: one[0].square)
+    scale, share = pooled.scale, pooled.share
     if not scale > 0.0:
         return None
     largest = max(float(np.max(np.abs(one.torque.values))) for one in spans)
@@ -181,10 +182,10 @@ def _balance(
         centre[1] = -late * scale
         if with_offset:
             prior[2, 2] = 1.0 / (scale * TORQUE.zero * largest) ** 2
-        fitted = [_fit_span(one, late, size, scale) for one in spans]
+        fitted = [_fit_span(one, late, size, scale, share) for one in spans]
         values = [one for one, _ in fitted]
         wrong = sum(each for _, each in fitted)
-        found = combine(values, prior, centre, fixed=(2,) if with_offset else ())
+        found = combine(values, prior, centre, fixed=range(1, size))
         if found is None or not found.value[0] > 0.0:
             return None
         scale = float(found.value[0])
@@ -194,27 +195,37 @@ def _balance(
             break
     if found is None:
         return None
-    # Least squares on an impulse with errors finds 1/J smaller by this share.
-    share = wrong * float(np.diag(found.covariance)[0])
-    return TorqueBalance(_shift_dead_time(found, late), spans[0].ratio, share)
+    # Least squares on an impulse with errors finds 1/J smaller by this part.
+    smaller = wrong * float(np.diag(found.covariance)[0])
+    return TorqueBalance(_shift_dead_time(found, late), spans[0].ratio, smaller)
 
 
-def _pool(spans: Sequence[TorqueSpan], late: float, size: int) -> tuple[float, float]:
-    """Sum of squares of plain least squares over all spans with a dead time, and 1/J there.
+@dataclass(frozen=True)
+class _Pooled:
+    """Plain least squares over all spans: sum of squares, 1/J, and the coefficient of the swing
+    that the torque causes over 1/J."""
 
-    T_0, which is small, is left out.
-    """
+    square: float
+    scale: float
+    share: float
+
+
+def _pool(spans: Sequence[TorqueSpan], late: float, size: int) -> _Pooled:
+    """Fit all spans with a dead time; T_0, which is small, is left out."""
     rows, targets = [], []
     for one in spans:
         wanted, other = _build_columns(one, late, size)
-        both = np.column_stack([wanted[:, :1], one.speed])
-        q, _ = np.linalg.qr(other)
+        swings = 0 if one.swing is None else 1
+        both = np.column_stack([wanted[:, :1], other[:, other.shape[1] - swings :], one.speed])
+        q, _ = np.linalg.qr(other[:, : other.shape[1] - swings])
         left = both - q @ (q.T @ both)
         rows.append(left[:, :-1])
         targets.append(left[:, -1])
     columns, values = np.vstack(rows), np.concatenate(targets)
     found = np.linalg.lstsq(columns, values, rcond=None)[0]
-    return float(np.sum((values - columns @ found) ** 2)), float(found[0])
+    scale = float(found[0])
+    share = float(found[1]) / scale if found.size > 1 and scale != 0.0 else 0.0
+    return _Pooled(float(np.sum((values - columns @ found) ** 2)), scale, share)
 
 
 def _shift_dead_time(found: Combined, late: float) -> Combined:
@@ -224,14 +235,16 @@ def _shift_dead_time(found: Combined, late: float) -> Combined:
     return replace(found, value=value)
 
 
-def _fit_span(one: TorqueSpan, late: float, size: int, scale: float) -> tuple[ShiftValue, float]:
+def _fit_span(
+    one: TorqueSpan, late: float, size: int, scale: float, share: float
+) -> tuple[ShiftValue, float]:
     """Coefficients of one span with their information, all others being eliminated, and the part
     of the information on 1/J that errors of the impulse pretend.
 
     `scale` is 1/J [1/(kg m^2)], by which errors of the torque become such of the speed.
     """
     time = one.time - one.time[0]
-    wanted, other = _build_columns(one, late, size)
+    wanted, other = _build_columns(one, late, size, share)
     columns = np.column_stack([wanted, other])
     basis, strength, _ = np.linalg.svd(
         columns / np.linalg.norm(columns, axis=0), full_matrices=False
@@ -284,8 +297,14 @@ def _build_message_covariance(one: TorqueSpan, late: float) -> FloatArray:
     return np.asarray((passed * sizes**2) @ passed.T)
 
 
-def _build_columns(one: TorqueSpan, late: float, size: int) -> tuple[FloatArray, FloatArray]:
-    """Columns of 1/J, the step of d/J and T_0/J (n, size), and those of no interest (n, m)."""
+def _build_columns(
+    one: TorqueSpan, late: float, size: int, share: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Columns of 1/J, the step of d/J and T_0/J (n, size), and those of no interest (n, m).
+
+    The last of the latter is the swing that the torque causes. It has `share` times the coefficient
+    of 1/J, and moves with the dead time too.
+    """
     shown = one.time + late
     impulse = one.ratio * integrate_torque(one.torque, shown)
     torque = one.ratio * one.torque.interpolate(shown)
@@ -297,11 +316,22 @@ def _build_columns(one: TorqueSpan, late: float, size: int) -> tuple[FloatArray,
     else:
         wanted = [impulse, torque, time]
     if one.swing is not None:
+        wanted[1] = torque + share * _differentiate_swing(one, late)
         fall, angle = np.exp(-one.swing.rate * time), one.swing.omega * time
         other += [fall * np.cos(angle), fall * np.sin(angle)]
         response = compute_swing_response(one.time, one.torque, late, one.swing)
         other.append(one.ratio * response)
     return np.column_stack(wanted), np.column_stack(other)
+
+
+def _differentiate_swing(one: TorqueSpan, late: float) -> FloatArray:
+    """Derivative (n,) by the dead time of the swing that the torque causes, times inertia."""
+    assert one.swing is not None
+    ahead, behind = (
+        compute_swing_response(one.time, one.torque, late + step, one.swing)
+        for step in (TORQUE.fine, -TORQUE.fine)
+    )
+    return np.asarray(one.ratio * (ahead - behind) / (2.0 * TORQUE.fine))
 
 
 def integrate_torque(torque: Signal, time: FloatArray) -> FloatArray:

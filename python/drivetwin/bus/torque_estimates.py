@@ -32,7 +32,8 @@ from drivetwin.bus.torque import (
     select_held,
     select_open,
 )
-from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.estimation.result.estimate import Z95, Estimate
+from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain
 from drivetwin.vehicle.ratio_card import RatioCard
 
@@ -46,6 +47,26 @@ class TorqueResults:
     balances: dict[str, TorqueBalance] = field(default_factory=dict)
     energies: dict[str, tuple[float, float]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+
+
+def find_dead_time(
+    lines: Sequence[Timeline],
+    ratios: Mapping[str, float],
+    late: Mapping[str, float],
+    decays: Mapping[str, JointDecay],
+) -> float | None:
+    """First look at the dead time [s] of the torque message: of the open clutch, else in gear.
+
+    None where there is no torque, or an interval wider than a value with a verdict.
+    """
+    alone = balance_open(_list_open(lines, late.get("engine_speed", 0.0)))
+    found = [] if alone is None else [alone]
+    if not found:
+        held = _list_held(lines, ratios, decays).values()
+        found = [one for spans in held if (one := balance_held(spans)) is not None]
+    times = [one.compute_dead_time() for one in found]
+    dead, std = min(times, key=lambda one: one[1], default=(0.0, np.inf))
+    return dead if Z95 * std < 4.0 * VERDICT.delay_identified else None
 
 
 _ALL = (ENGINE, VEHICLE, MASS, DEAD_TIME)

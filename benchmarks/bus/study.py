@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""Estimates of made drives against their truth, with a ring-down by SciPy beside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from scipy.optimize import curve_fit
+from scipy.special import stdtrit
+
+from benchmarks.bus.made import J_OUT, Vehicle, make_drive
+from drivetwin._util.arrays import FloatArray
+from drivetwin.bus.decay import DecayRecord, JointDecay
+from drivetwin.bus.identify import BusIdentification, identify_bus
+from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.logs.read import read_log
+from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.spec import PriorValue
+
+FINAL_DRIVE, RADIUS = 3.5, 0.5
+QUANTITIES = {
+    "f_d": "resonance",
+    "zeta": "damping",
+    "J_engine": "J′, clutch open",
+    "mass_over_eta": "mass over η",
+    "speed_delay": "delays of speeds",
+    "torque_delay": "dead time of the torque",
+}
+"""Quantities that count, by the begin of their id."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity of one drive: truth, value and half of the 95 % interval, None where there is no
+    value, and its verdict; `peer` and `peer_half` of the ring-down by SciPy."""
+
+    seed: int
+    quantity: str
+    id: str
+    truth: float
+    value: float | None
+    half: float | None
+    verdict: str
+    peer: float | None = None
+    peer_half: float | None = None
+
+    @property
+    def is_inside(self) -> bool:
+        """True where the interval contains the truth."""
+        return self.value is not None and abs(self.value - self.truth) <= (self.half or 0.0)
+
+
+def list_truth(vehicle: Vehicle) -> dict[str, float]:
+    """True values by id."""
+    factor = (FINAL_DRIVE / RADIUS) ** 2
+    found = {
+        "J_engine": vehicle.J_e,
+        "mass_over_eta": factor * (vehicle.J_v + J_OUT) / vehicle.eta,
+        "speed_delay.output_speed": vehicle.output_late,
+        "speed_delay.engine_speed": vehicle.engine_late,
+        "torque_delay": vehicle.dead_time,
+    }
+    for number, ratio in enumerate(vehicle.ratios, start=1):
+        frequency, damping = vehicle.compute_swing(ratio)
+        found |= {f"f_d_{number}": frequency, f"zeta_{number}": damping}
+    return found
+
+
+def study_drive(seed: int) -> tuple[list[Row], float]:
+    """Identify one made drive; returns its rows and the time of the identification [s]."""
+    with TemporaryDirectory() as folder:
+        vehicle, path = make_drive(seed, Path(folder))
+        start = perf_counter()
+        log = read_log(path, None)
+        ratios = {str(k): PriorValue(one) for k, one in enumerate(vehicle.ratios, start=1)}
+        card = RatioCard("", ratios, PriorValue(FINAL_DRIVE), RADIUS)
+        found = identify_bus([log], card)
+        seconds = perf_counter() - start
+    return list(_compare(seed, list_truth(vehicle), found)), seconds
+
+
+def _compare(seed: int, truth: dict[str, float], found: BusIdentification) -> Iterator[Row]:
+    for name, true in truth.items():
+        one = found.estimates.get(name)
+        if one is None:
+            continue
+        quantity = next(stem for stem in QUANTITIES if name.startswith(stem))
+        interval = one.ci95_total
+        half = None if interval is None else 0.5 * (interval[1] - interval[0])
+        peer: tuple[float | None, float | None] = (None, None)
+        joint = found.decays.get(name.rpartition("_")[2])
+        if quantity in ("f_d", "zeta") and joint is not None:
+            peer = fit_peer(joint, quantity)
+        yield Row(seed, quantity, name, true, one.value, half, one.verdict.value, *peer)
+
+
+def fit_peer(joint: JointDecay, quantity: str) -> tuple[float | None, float | None]:
+    """Mean of the decays fitted one by one, and half of the t interval of that mean."""
+    fitted = [made for one in joint.fits if (made := fit_single(one.record)) is not None]
+    if len(fitted) < 2:
+        return None, None
+    values = np.array([one[0 if quantity == "f_d" else 1] for one in fitted])
+    spread = float(values.std(ddof=1)) / np.sqrt(values.size)
+    return float(values.mean()), float(stdtrit(values.size - 1, 0.975) * spread)
+
+
+def fit_single(record: DecayRecord) -> tuple[float, float] | None:
+    """Frequency [Hz] and damping ratio of one decay by `scipy.optimize.curve_fit`.
+
+    A damped sine on a quadratic trend, from the strongest line of the spectrum of what a quadratic
+    leaves. None where the fit does not converge or has no damped oscillation.
+    """
+    time, values = record.time, record.values - record.values.mean()
+    rest = values - np.polyval(np.polyfit(time, values, 2), time)
+    lines = np.linspace(1.0, 15.0, 300)
+    power = np.abs(np.exp(-2j * np.pi * np.outer(lines, time)) @ rest)
+    first = float(lines[int(np.argmax(power))])
+
+    def model(t: FloatArray, *p: float) -> FloatArray:
+        wave = np.exp(-p[0] * t) * (p[2] * np.cos(p[1] * t) + p[3] * np.sin(p[1] * t))
+        return np.asarray(wave + p[4] + p[5] * t + p[6] * t * t)
+
+    start = (1.5, 2.0 * np.pi * first, np.ptp(rest) / 2.0, 0.0, 0.0, 0.0, 0.0)
+    try:
+        found, _ = curve_fit(model, time, values, start, maxfev=4000)
+    except RuntimeError:
+        return None
+    rate, omega = float(found[0]), abs(float(found[1]))
+    damping = rate / float(np.hypot(rate, omega))
+    return (omega / (2.0 * np.pi), damping) if 0.0 < damping < 0.5 else None
+
+
+def to_record(rows: Sequence[Row], seconds: float) -> dict[str, Any]:
+    """Rows of one drive as plain values."""
+    return {"seconds": seconds, "rows": [asdict(one) for one in rows]}
+
+
+def format_tables(drives: Sequence[Sequence[Row]]) -> str:
+    """Coverage by quantity, and the ring-down by SciPy beside."""
+    lines = [
+        f"{len(drives)} drives.",
+        "",
+        "| quantity | values | inside 95 % | drives with all inside | identified | median ± % |",
+        "|---|---|---|---|---|---|",
+    ]
+    every = [one for drive in drives for one in drive if one.value is not None]
+    for stem, name in QUANTITIES.items():
+        values = [one for one in every if one.quantity == stem]
+        if not values:
+            continue
+        drive_count = len({one.seed for one in values})
+        failed = {one.seed for one in values if not one.is_inside}
+        known = sum(one.verdict == Verdict.IDENTIFIED for one in values)
+        width = np.median([100.0 * (one.half or np.nan) / abs(one.truth) for one in values])
+        share = np.mean([one.is_inside for one in values])
+        lines.append(
+            f"| {name} | {len(values)} | {100.0 * share:.1f} % | "
+            f"{drive_count - len(failed)} of {drive_count} | {known} | {width:.2g} |"
+        )
+    pooled = np.mean([one.is_inside for one in every])
+    many = np.mean(
+        [sum(one.verdict == Verdict.IDENTIFIED for one in drive) >= 6 for drive in drives]
+    )
+    lines += [
+        "",
+        f"Pooled: {100.0 * pooled:.1f} % of {len(every)} values inside. Drives with six identified "
+        f"quantities or more: {100.0 * many:.0f} %.",
+        "",
+        "| | rms error, % | inside 95 % | SciPy: rms error, % | inside 95 % |",
+        "|---|---|---|---|---|",
+    ]
+    for stem in ("f_d", "zeta"):
+        both = [one for one in every if one.quantity == stem and one.peer is not None]
+        own = [(one.value or 0.0) / one.truth - 1.0 for one in both]
+        peer = [(one.peer or 0.0) / one.truth - 1.0 for one in both]
+        inside = [abs((one.peer or 0.0) - one.truth) <= (one.peer_half or 0.0) for one in both]
+        lines.append(
+            f"| {QUANTITIES[stem]} | {100.0 * np.sqrt(np.mean(np.square(own))):.2g} | "
+            f"{100.0 * np.mean([one.is_inside for one in both]):.0f} % | "
+            f"{100.0 * np.sqrt(np.mean(np.square(peer))):.2g} | {100.0 * np.mean(inside):.0f} % |"
+        )
+    return "\n".join(lines) + "\n"
