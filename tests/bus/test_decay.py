@@ -83,8 +83,8 @@ def test_a_decay_of_another_frequency_contradicts() -> None:
 
 def test_a_decay_that_took_no_part_is_inside_its_band() -> None:
     shares = []
-    for seed in range(5):
-        *fitted, held = make_several(10 + seed)
+    for seed in range(12):
+        *fitted, held = make_several(10 + seed, 4)
         found = fit_decays(fitted)
         assert found is not None
         predicted = predict_decay(found, held)

@@ -23,7 +23,7 @@ VEHICLE, MASS = "J_vehicle_out", "mass_over_eta"
 _SPECS = {
     SQUARE: ParameterSpec(
         SQUARE,
-        "stiffness over inertia",
+        "Stiffness over inertia",
         "k/J",
         "1/s^2",
         "k·(1/J_a + 1/J_b) = σ² + ω² of the two sides of the driveline",
@@ -32,7 +32,7 @@ _SPECS = {
     ),
     DELAY: ParameterSpec(
         DELAY,
-        "delay behind the input speed",
+        "Delay behind the input speed",
         "τ",
         "s",
         "time by which the bus shows a speed later than the input speed",
@@ -41,7 +41,7 @@ _SPECS = {
     ),
     DEAD_TIME: ParameterSpec(
         DEAD_TIME,
-        "dead time of the torque message",
+        "Dead time of the torque message",
         "d",
         "s",
         "time by which the bus shows the engine torque later than it acts",
@@ -50,7 +50,7 @@ _SPECS = {
     ),
     ENGINE: ParameterSpec(
         ENGINE,
-        "engine inertia, clutch open",
+        "Engine inertia, clutch open",
         "J_e",
         "kg*m^2",
         "inertia of the engine side with the clutch open",
@@ -59,7 +59,7 @@ _SPECS = {
     ),
     TOTAL: ParameterSpec(
         TOTAL,
-        "total inertia over η",
+        "Total inertia over η",
         "J/η",
         "kg*m^2",
         "J_v/η + i²·J_e at the gearbox output, in a gear",
@@ -68,7 +68,7 @@ _SPECS = {
     ),
     VEHICLE: ParameterSpec(
         VEHICLE,
-        "vehicle inertia over η",
+        "Vehicle inertia over η",
         "J_v/η",
         "kg*m^2",
         "inertia of the vehicle at the gearbox output over the efficiency",
@@ -77,7 +77,7 @@ _SPECS = {
     ),
     MASS: ParameterSpec(
         MASS,
-        "vehicle mass over η",
+        "Vehicle mass over η",
         "m/η",
         "kg",
         "mass of the vehicle over the efficiency, by final drive and wheel radius",

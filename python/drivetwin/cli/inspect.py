@@ -59,11 +59,14 @@ def inspect(request: Inspect, *, as_json: bool) -> None:
     from drivetwin.logs.formats.can.database import list_databases
     from drivetwin.logs.mapping_draft import draft_mapping
     from drivetwin.vehicle.card import load_card
+    from drivetwin.vehicle.ratio_card import is_ratio_card
 
     log, write_mapping, accept = request.log, request.write_mapping, request.accept_proposals
     if accept and write_mapping is None:
         raise InputError("--accept-proposals needs a mapping file", "add --write-mapping MAP")
-    card = None if request.vehicle is None else load_card(request.vehicle)
+    vehicle = request.vehicle
+    # A card of the ratios alone names no pressures.
+    card = None if vehicle is None or is_ratio_card(vehicle) else load_card(vehicle)
     stated = find_mapping(request.channels, log)
     with show_step(f"reading {log.name}"):
         try:

@@ -141,10 +141,10 @@ def _build_decays(found: BusIdentification) -> Iterator[Block]:
 def _plot_decays(joint: JointDecay) -> Figure:
     panels = [
         Panel(
-            fit.record.label,
+            "n_in",
             RPM,
             [
-                Curve("measured", fit.record.time, fit.record.values, MEASURED),
+                Curve(fit.record.label, fit.record.time, fit.record.values, MEASURED),
                 Curve("fitted", fit.record.time, fit.fitted, SIMULATED),
             ],
         )
@@ -170,10 +170,10 @@ def _build_prediction_panel(one: DecayPrediction) -> Panel:
     curves = [
         Curve("95 % band", time[k], one.mean[k] - half, _BAND, width=0.5, listed=False),
         Curve("95 % band", time[k], one.mean[k] + half, _BAND, width=0.5, fill=_BAND),
-        Curve("measured", time, one.record.values, MEASURED),
+        Curve(one.record.label, time, one.record.values, MEASURED),
         Curve("predicted", time[k], one.mean[k], SIMULATED),
     ]
-    return Panel(one.record.label, RPM, curves)
+    return Panel("n_in", RPM, curves)
 
 
 def _build_prediction_table(found: BusIdentification) -> Iterator[Block]:
