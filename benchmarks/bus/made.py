@@ -66,7 +66,7 @@ class Vehicle:
         return float(np.sqrt(square - rate**2) / (2.0 * np.pi)), float(rate / np.sqrt(square))
 
 
-J_OUT = 0.05
+J_OUT = 0.5
 """Inertia of the output side before the shaft [kg m^2]."""
 
 

@@ -18,6 +18,7 @@ from benchmarks.bus.made import J_OUT, Vehicle, make_drive
 from drivetwin._util.arrays import FloatArray
 from drivetwin.bus.decay import DecayRecord, JointDecay
 from drivetwin.bus.identify import BusIdentification, identify_bus
+from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.ratio_card import RatioCard
@@ -77,7 +78,14 @@ def study_drive(seed: int) -> tuple[list[Row], float]:
     with TemporaryDirectory() as folder:
         vehicle, path = make_drive(seed, Path(folder))
         start = perf_counter()
-        log = read_log(path, None)
+        try:
+            log = read_log(path, None)
+        except DrivetwinError:  # counts as a drive without any value
+            stems = {name: _get_quantity(name) for name in list_truth(vehicle)}
+            return [
+                Row(seed, stems[name], name, true, None, None, Verdict.NOT_IDENTIFIABLE.value)
+                for name, true in list_truth(vehicle).items()
+            ], perf_counter() - start
         ratios = {str(k): PriorValue(one) for k, one in enumerate(vehicle.ratios, start=1)}
         card = RatioCard("", ratios, PriorValue(FINAL_DRIVE), RADIUS)
         found = identify_bus([log], card)
@@ -90,7 +98,7 @@ def _compare(seed: int, truth: dict[str, float], found: BusIdentification) -> It
         one = found.estimates.get(name)
         if one is None:
             continue
-        quantity = next(stem for stem in QUANTITIES if name.startswith(stem))
+        quantity = _get_quantity(name)
         interval = one.ci95_total
         half = None if interval is None else 0.5 * (interval[1] - interval[0])
         peer: tuple[float | None, float | None] = (None, None)
@@ -98,6 +106,10 @@ def _compare(seed: int, truth: dict[str, float], found: BusIdentification) -> It
         if quantity in ("f_d", "zeta") and joint is not None:
             peer = fit_peer(joint, quantity)
         yield Row(seed, quantity, name, true, one.value, half, one.verdict.value, *peer)
+
+
+def _get_quantity(name: str) -> str:
+    return next(stem for stem in QUANTITIES if name.startswith(stem))
 
 
 def fit_peer(joint: JointDecay, quantity: str) -> tuple[float | None, float | None]:
