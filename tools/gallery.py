@@ -23,17 +23,13 @@ _SIZE = "--window-size=1200,1000"
 
 @dataclass(frozen=True)
 class Entry:
-    """One result: commands, the page that they write, a heading and a sentence.
-
-    `anchor` is the section of the page that the picture shows; without one, its beginning.
-    """
+    """One result: commands, the page that they write, a heading and a sentence."""
 
     name: str
     title: str
     sentence: str
     commands: tuple[str, ...]
     page: str
-    anchor: str = ""
 
 
 _SHIFT = (
@@ -174,7 +170,7 @@ def draw_entry(browser: str, entry: Entry) -> Path:
             program = [sys.executable, "-m", "drivetwin", *arguments]
             subprocess.run(program, check=True, capture_output=True, cwd=folder)
         profile = f"--user-data-dir={folder / 'profile'}"
-        address = (folder / entry.page).as_uri() + (f"#{entry.anchor}" if entry.anchor else "")
+        address = (folder / entry.page).as_uri()
         options = [*OPTIONS, _SIZE, profile, f"--screenshot={picture}"]
         subprocess.run([browser, *options, address], check=True, capture_output=True)
     return picture

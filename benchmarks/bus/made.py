@@ -28,14 +28,14 @@ from drivetwin.simulation.dual_clutch import (
 
 RPM = np.pi / 30.0
 SHIFTS = 20
-"""Shifts of a drive."""
+"""Shifts of a drive, as the study states it."""
 _LENGTH, _BEFORE = 11.0, 4.0
 """Length of the record of a shift and time before the clutch opens [s]."""
 _STEP = 2e-3
-"""Step of the simulated signals [s]."""
+"""Step of the simulated signals [s]: a fifth of that of the messages."""
 _FLAT = Stribeck(0.1, 0.1, 10.0, 0.0)
 _FRICTION = 6.0
-"""Nominal friction torque [%]."""
+"""Nominal friction torque [%]; it cancels in the net torque, so that its size does not matter."""
 _RESOLUTION = 0.125 * RPM
 
 
@@ -67,7 +67,8 @@ class Vehicle:
 
 
 J_OUT = 0.5
-"""Inertia of the output side before the shaft [kg m^2]."""
+"""Inertia of the output side before the shaft [kg m^2]: below 1 % of any drawn vehicle. A
+lighter one swings faster with an open clutch than messages of 10 ms can show."""
 
 
 def draw_vehicle(rng: np.random.Generator) -> Vehicle:

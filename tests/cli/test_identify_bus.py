@@ -92,7 +92,7 @@ def test_an_output_torque_needs_a_vehicle_card(
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "message"),
     [
         (["--strict"], "no model to validate"),
         (["--hold-out", "other"], "names no log"),
@@ -100,10 +100,10 @@ def test_an_output_torque_needs_a_vehicle_card(
     ],
 )
 def test_what_bus_logs_cannot_give_is_refused(
-    logs: list[Path], more: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    logs: list[Path], more: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["identify", str(logs[0]), *more]) == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_faults_of_a_card_of_ratios_are_listed(

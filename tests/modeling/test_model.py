@@ -36,7 +36,7 @@ def test_a_brake_stops_a_wheel_and_heats_by_its_energy() -> None:
     model, wheel, brake = _brake_test()
     run = model.simulate(1.0)
     assert run.status == "completed"
-    assert [event.kind for event in run.events.of(brake)] == ["lock"]
+    assert [event.kind for event in run.events.select(brake)] == ["lock"]
     assert run[wheel.speed] == pytest.approx(np.maximum(4.0 - 5.0 * run.time, 0.0), abs=1e-9)
     slips = run.time < 0.799
     assert run[brake.torque][slips] == pytest.approx(10.0)

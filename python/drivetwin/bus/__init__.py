@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What speeds, gear and engine torque of a bus say about a vehicle, from all shifts together."""
+"""Identification of a vehicle from speeds, gear and engine torque on the bus, by all shifts."""

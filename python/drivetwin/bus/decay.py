@@ -30,7 +30,7 @@ from drivetwin.bus.drift import (
     fit_noise,
     regress,
 )
-from drivetwin.bus.recording import Signal
+from drivetwin.bus.recording import Signal, average_neighbours
 from drivetwin.bus.scatter import Combined, ShiftValue, combine
 from drivetwin.bus.torque import compute_swing_response, integrate_torque
 from drivetwin.estimation.linear.ringdown import RING_DOWN
@@ -98,10 +98,7 @@ class DecayRecord:
         step = float(np.median(np.diff(self.time)))
         fine = int(2.0 * np.pi / swing.omega / DECAY.per_period / step)
         width = max(1, min(fine, self.time.size // DECAY.samples))
-        usable = self.time.size // width * width
-        time, values = (
-            x[:usable].reshape(-1, width).mean(axis=1) for x in (self.time, self.values)
-        )
+        time, values = (average_neighbours(one, width) for one in (self.time, self.values))
         start = self.start + float(time[0])
         floor = self.floor / float(np.sqrt(width))
         return replace(self, start=start, time=time - time[0], values=values, floor=floor)

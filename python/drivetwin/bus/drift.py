@@ -22,9 +22,10 @@ from scipy.optimize import minimize
 from drivetwin._util.arrays import FloatArray
 
 _LOWEST = 1e-4
-"""Smallest size of a noise part over its start."""
+"""Smallest start of a noise part over the rms of the residual: the search is over logarithms."""
 _JITTER = 1e-10
-"""Share of the trace added to a covariance, for rounding errors."""
+"""Share of the mean variance added to a covariance: a million times the rounding error of its
+factors, and below any noise."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the bus logs of one vehicle determine, from all their shifts together."""
+"""Joint identification of one vehicle from all shifts of its bus logs."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def identify_bus(
             "check the ratios on the card, and the speeds with 'drivetwin inspect'",
             Where(file=bus[0].source if bus else None),
         )
-    made = _Maker(ratios, card)
+    made = _ResultBuilder(ratios, card)
     made.add_alignment(aligned)
     made.add_decays(_collect_decays(timelines))
     dead = find_dead_time(timelines, ratios, late, made.decays)
@@ -230,7 +230,7 @@ def find_contradictions(quantity: str, combined: Combined) -> Iterator[Finding]:
         yield report(Code.BUS_SHIFTS_CONTRADICT, shift=shift, quantity=quantity, p=p)
 
 
-class _Maker:
+class _ResultBuilder:
     """Estimates and findings, added stage by stage."""
 
     def __init__(self, ratios: Mapping[str, float], card: RatioCard | None) -> None:

@@ -27,9 +27,11 @@ from drivetwin.shifts.shift import ShiftSettings
 SETTINGS = ShiftSettings(ratio_tolerance=0.02)
 """Settings of the gears held. The tolerance is that of a ratio while the driveline swings."""
 _MIN_SAMPLES = 20
-"""Fewest samples of a stretch in which a gear is looked for."""
+"""Fewest samples of a stretch in which a gear is looked for: 0.2 s of a message of 10 ms, about the
+shortest gear held."""
 _CLOSED = 0.02
-"""Slip of the clutch over the engine speed up to which it counts as closed [ratio]."""
+"""Slip of the clutch over the input speed up to which it counts as closed [ratio]: as far as a
+swinging driveline moves a ratio (`SETTINGS`)."""
 _FLAG_REACH = 1.0
 """Longest time [s] between engaged gear and end of the shift flag that belong to one shift."""
 _CLUSTER = 0.04

@@ -63,12 +63,16 @@ class Signal:
         return split_at_gaps(span, find_pauses(self.time)) == (span,)
 
 
+def average_neighbours(samples: FloatArray, width: int) -> FloatArray:
+    """Average `width` neighbours each; return (n // width,) means of (n,) samples."""
+    return np.asarray(samples[: samples.size // width * width].reshape(-1, width).mean(axis=1))
+
+
 @dataclass(frozen=True, eq=False)
 class BusLog:
     """One bus log: `signals` by role, `gear` steps and `flags` (spans [s] of the shift flag).
 
-    `late` are the delays [s] of the speeds behind the input speed, by role; `stretches` [s] are the
-    parts in which both gearbox speeds are recorded without a gap.
+    `stretches` [s] are the parts in which both gearbox speeds are recorded without a gap.
     """
 
     label: str

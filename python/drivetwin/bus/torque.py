@@ -28,7 +28,7 @@ from scipy.signal import lfilter
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.bus.drift import Swing, build_covariance, fit_noise
-from drivetwin.bus.recording import Signal
+from drivetwin.bus.recording import Signal, average_neighbours
 from drivetwin.bus.scatter import Combined, ShiftValue, combine
 
 
@@ -136,16 +136,11 @@ def select_held(
     for low, high in pairwise(edges):
         time, values = inlet.select((low, high))
         if time.size > 20 and torque.covers((low, high)):
-            time, values = _thin(time), _thin(values)
+            width = max(1, round(time.size / TORQUE.samples))
+            time, values = (average_neighbours(one, width) for one in (time, values))
             floor = inlet.floor / ratio
             found.append(TorqueSpan(label, gear, time, values / ratio, floor, torque, ratio, swing))
     return found
-
-
-def _thin(samples: FloatArray) -> FloatArray:
-    """Means (m,) of so many neighbours that few samples are left."""
-    width = max(1, round(samples.size / TORQUE.samples))
-    return np.asarray(samples[: samples.size // width * width].reshape(-1, width).mean(axis=1))
 
 
 def balance_open(spans: Sequence[TorqueSpan]) -> TorqueBalance | None:

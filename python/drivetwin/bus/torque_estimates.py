@@ -173,7 +173,7 @@ def _add_vehicle(
         weight = np.outer(row, row) / std**2
         point = row * inertia / float(row @ row)
         values.append(ShiftValue(f"gear {gear}" if gear else "open clutch", point, weight))
-    found = combine_fixed(values)
+    found = _combine_fixed(values)
     gears = [one.combined.count for gear, one in balances.items() if gear]
     if found is None or not gears:
         reason = explain(Code.BUS_NO_SPAN, least=Number(TORQUE.min_held, "s"))
@@ -190,7 +190,7 @@ def _add_vehicle(
     _add(estimates, make_estimate(MASS, "", factor * value, factor * std, best.combined))
 
 
-def combine_fixed(
+def _combine_fixed(
     values: Sequence[ShiftValue],
 ) -> tuple[FloatArray, FloatArray] | None:
     """Weighted least squares without scatter: mean (p,) and covariance (p, p); None if singular.
@@ -218,7 +218,7 @@ def _add_dead_time(estimates: dict[str, Estimate], balances: Mapping[str, Torque
     for gear, one in balances.items():
         dead, std = one.compute_dead_time()
         values.append(ShiftValue(gear or "open clutch", np.array([dead]), np.array([[std**-2]])))
-    found = combine_fixed(values)
+    found = _combine_fixed(values)
     if found is None:
         _add(estimates, refuse(DEAD_TIME, "", explain(Code.BUS_NO_CLUTCH)))
         return

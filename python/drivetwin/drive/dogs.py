@@ -24,10 +24,10 @@ from drivetwin.drive.result import Action
 from drivetwin.drive.schedule import Schedule
 from drivetwin.drive.shift_plan import CLOSE, FILL, MARGIN, OPEN, RAMP, compute_pressure
 from drivetwin.errors import CardError, InputError, SimulationError
-from drivetwin.gearbox import Gearbox
-from drivetwin.simulation.dual_clutch import FloatArray
-from drivetwin.simulation.element_schema import GROUND
-from drivetwin.simulation.network import Output
+from drivetwin.gearbox import Gearbox, build_network_elements
+from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.element_schema import GROUND, list_ports
+from drivetwin.simulation.network import Output, Start, build_element, simulate
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 ENGAGED = 1e6
@@ -60,41 +60,41 @@ def split_gear(gearbox: Gearbox, gear: str) -> DogGear:
 
 
 def compute_synchronised_inertia(gearbox: Gearbox, dog: str, engaged: Sequence[str]) -> float:
-    """Inertia that a synchroniser brings to speed, per slip of its dog [kg m^2].
+    """Compute the inertia that a synchroniser brings to speed, per slip of its dog [kg m^2].
 
-    The output is held, elements in `engaged` turn rigidly, all clutches are open: J = 1/(c·M⁻¹·c)
-    on the free motions, with c the slip of the dog in them. The spin of planets is left out.
-    Raises CardError where a member that moves has no inertia.
+    The core accelerates the gearbox from rest by 1 N m across the dog, with the output held, the
+    dogs in `engaged` engaged and all clutches open. 0 where the dog cannot slip. Raises CardError
+    where a member that moves has no inertia.
     """
-    rows: list[dict[str, float]] = [_get_slip(gearbox, dog), {gearbox.output: 1.0}]
-    rows += [{pair.a: 1.0, pair.b: -pair.ratio} for pair in gearbox.pairs]
-    rows += [{s.sun: 1.0, s.ring: s.z, s.carrier: -1.0 - s.z} for s in gearbox.sets]
-    rows += [_get_slip(gearbox, name) for name in engaged]
-    members = [name for name in dict.fromkeys(key for row in rows for key in row) if name != GROUND]
-    slip, *constraints = np.array([[row.get(name, 0.0) for name in members] for row in rows])
-    _, sizes, turns = np.linalg.svd(np.array(constraints))
-    free = turns[int(np.sum(sizes > _ROUND_OFF * sizes[0])) :].T
-    inertias = np.array([gearbox.inertias.get(name, 0.0) for name in members])
-    mass = free.T @ (inertias[:, None] * free)
-    moved = free.T @ slip
-    if not np.abs(moved).max(initial=0.0) > _ROUND_OFF:
-        return 0.0
-    if np.linalg.matrix_rank(mass, hermitian=True) < len(mass):
+    element = gearbox.elements[dog]
+    ends = [end for end in (element.a, element.b) if end != GROUND]
+    reaction = {"reaction": ends[1]} if ends[1:] else {}
+    elements = [
+        *build_network_elements(gearbox, engaged),
+        build_element("prescribed_speed", _HELD, node=gearbox.output, input=_HELD),
+        build_element("torque", _CONE, node=ends[0], input=_CONE, **reaction),
+    ]
+    levels = {name: 0.0 for name in gearbox.elements if name not in gearbox.dogs}
+    levels |= {_HELD: 0.0, _CONE: 1.0}
+    time = np.array([0.0, STEP])
+    inputs = {name: Signal(time, np.full(2, value)) for name, value in levels.items()}
+    outputs: list[Output] = [("acceleration", end) for end in ends]
+    nodes = {node for one in elements for node in list_ports(one).values()} - {GROUND}
+    start = Start(dict.fromkeys(sorted(nodes), 0.0))
+    try:
+        columns = simulate(elements, inputs, start, time, outputs).columns
+    except InputError as error:
         raise CardError(
-            f"a member that the synchroniser of {dog} turns has no inertia",
+            f"a member that the synchroniser of {dog} turns has no inertia: {error.what}",
             "give [inertia_kgm2] of all members of the gearbox card",
-        )
-    return 1.0 / float(moved @ np.linalg.solve(mass, moved))
+        ) from error
+    first, *second = (float(columns[one][0]) for one in outputs)
+    slip = first - sum(second)
+    return 1.0 / slip if slip > 0.0 else 0.0
 
 
-_ROUND_OFF = 1e-12
-"""Relative size of a singular value that counts as none."""
-
-
-def _get_slip(gearbox: Gearbox, name: str) -> dict[str, float]:
-    """Slip of a shift element as coefficients of the speeds of its members."""
-    element = gearbox.elements[name]
-    return {element.a: 1.0, element.b: -1.0}
+_HELD, _CONE = "held output", "cone"
+"""Elements and inputs that turn a synchroniser for its inertia."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`bus.json`: what the bus logs of one vehicle determine, for machines."""
+"""`bus.json`: result of the bus logs of one vehicle, for machines."""
 
 from __future__ import annotations
 

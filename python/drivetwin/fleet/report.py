@@ -47,7 +47,7 @@ from drivetwin.report.figures.friction import plot_friction
 from drivetwin.report.html import render_page
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.parameters import make_parameter_cell
-from drivetwin.report.whole_drive import build_comparison_table
+from drivetwin.report.whole_drive import build_comparison_table, get_figure_label
 from drivetwin.shifts.quality import QUALITY_UNITS
 
 PAGE = "report.html"
@@ -358,8 +358,9 @@ def _build_quality_section(store: Store) -> Section:
     for (kind, gears, name), values in merge_figures(units.values()).items():
         display = get_display_unit(QUALITY_UNITS[name])
         low, median, high = (display.factor * np.quantile(values, (0.1, 0.5, 0.9))).tolist()
-        label = f"{name.replace('_', ' ').capitalize()} [{display.label}]"
-        rows.append((label, f"{gears}, {kind.value}", values.size, median, low, high))
+        rows.append(
+            (get_figure_label(name), f"{gears}, {kind.value}", values.size, median, low, high)
+        )
     columns = (
         *("figure", "shift", ("shifts", "d"), ("median", "3")),
         *(("10 %", "3"), ("90 %", "3")),

@@ -6,7 +6,7 @@ wheel = model.inertia("wheel", 1.5)
 brake = model.clutch("brake", wheel, model.ground, pressure=[(0, 0), (1, 50)])
 model.start({wheel: 100.0})
 run = model.simulate(2.0)
-run[brake.power], run.events.of(brake)
+run[brake.power], run.events.select(brake)
 
 The schematic shows nodes as vertical shafts and elements as boxes between them.
 """

@@ -20,7 +20,7 @@ class Events(Sequence[Event]):
 
     all: tuple[Event, ...]
 
-    def of(self, component: Component | str) -> tuple[Event, ...]:
+    def select(self, component: Component | str) -> tuple[Event, ...]:
         """Return the events of one element."""
         name = component if isinstance(component, str) else component.name
         return tuple(event for event in self.all if event.element == name)

@@ -27,12 +27,10 @@ from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.html import render_page
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.parameters import build_parameter_blocks
-from drivetwin.report.style import MEASURED, SIMULATED
+from drivetwin.report.style import BAND, MEASURED, OVER, SIMULATED, UNDER
 
 _HEIGHT = 130
 """Height of a panel [px]."""
-_BAND = "rgba(213,94,0,0.18)"
-"""Colour of a 95 % band."""
 _SHOWN = 8
 """Decays of a gear in a figure [count]."""
 
@@ -144,8 +142,8 @@ def _plot_decays(joint: JointDecay) -> Figure:
             "n_in",
             RPM,
             [
-                Curve(fit.record.label, fit.record.time, fit.record.values, MEASURED),
-                Curve("fitted", fit.record.time, fit.fitted, SIMULATED),
+                Curve("fitted", fit.record.time, fit.fitted, SIMULATED, UNDER),
+                Curve(fit.record.label, fit.record.time, fit.record.values, MEASURED, OVER),
             ],
         )
         for fit in joint.fits[:_SHOWN]
@@ -168,8 +166,8 @@ def _build_prediction_panel(one: DecayPrediction) -> Panel:
     time, k = one.record.time, one.predicted
     half = Z95 * one.std[k]
     curves = [
-        Curve("95 % band", time[k], one.mean[k] - half, _BAND, width=0.5, listed=False),
-        Curve("95 % band", time[k], one.mean[k] + half, _BAND, width=0.5, fill=_BAND),
+        Curve("95 % band", time[k], one.mean[k] - half, BAND, width=0.5, listed=False),
+        Curve("95 % band", time[k], one.mean[k] + half, BAND, width=0.5, fill=BAND),
         Curve(one.record.label, time, one.record.values, MEASURED),
         Curve("predicted", time[k], one.mean[k], SIMULATED),
     ]

@@ -85,6 +85,11 @@ def _get_label(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
 
+def get_figure_label(name: str) -> str:
+    """Return the label of a figure of shift quality with its display unit."""
+    return f"{_get_label(name)} [{get_display_unit(QUALITY_UNITS[name]).label}]"
+
+
 _HOUR = 3600.0
 _OUTLIERS = "outliers"
 
@@ -125,7 +130,7 @@ def build_outlier_table(groups: Sequence[ShiftGroup]) -> TableBlock:
         shift = f"{group.gears}, {group.kind.value}"
         for name, one in group.figures.items():
             display = get_display_unit(QUALITY_UNITS[name])
-            label = f"{_get_label(name)} [{display.label}]"
+            label = get_figure_label(name)
             for outlier in one.outliers:
                 values = (display.factor * each for each in (outlier.value, one.median))
                 rows.append((label, shift, outlier.time, *values))
@@ -157,7 +162,7 @@ def build_comparison_table(comparison: Sequence[FigureComparison]) -> TableBlock
             middle, low, high = (format_significant(display.factor * each, 2) for each in ends)
             difference, p = f"{middle} ({low}..{high})", f"{one.difference.p:.2g}"
             verdict = "differ" if one.differs else "not shown"
-        label = f"{_get_label(one.figure)} [{display.label}]"
+        label = get_figure_label(one.figure)
         counts = " ".join(map(str, one.counts))
         shift = f"{one.gears}, {one.kind.value}"
         rows.append((label, shift, counts, medians, difference, p, verdict))

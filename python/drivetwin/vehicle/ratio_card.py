@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Card of the ratios alone: what a bus log needs to be known of a vehicle, and a little more."""
+"""Card of the ratios alone, with final drive and wheel radius, for bus logs."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def test_weighting_equals_the_dense_covariance() -> None:
     assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
 
 
-def _of_speeds(term: ShiftTerm, slope: float, rest: float) -> ShiftTerm:
+def _select_speeds(term: ShiftTerm, slope: float, rest: float) -> ShiftTerm:
     """The part with an engine torque computed from ω_e, on which it hangs by `slope`."""
     record, read = term.record, term.record.engine_torque
     torque = Signal(record.time, np.interp(record.time, read.time, read.values))
@@ -83,7 +83,7 @@ def _torque_by_speed(term: ShiftTerm) -> FloatArray:
 
 def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     term, point = _short()
-    term = _of_speeds(term, slope=-400.0, rest=2.0)
+    term = _select_speeds(term, slope=-400.0, rest=2.0)
     run = term.simulate(point)
     assert run is not None
     model, record = term.structure.build_model(point), term.record

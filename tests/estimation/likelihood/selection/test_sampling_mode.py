@@ -217,7 +217,7 @@ def test_with_an_output_torque_the_speeds_show_of_what_mode_they_are() -> None:
 @shared
 def _at_50_hertz(window: float) -> tuple[ShiftObjective, LikelihoodFit]:
     """A problem of outputs every 20 ms that are means over the `window` [s], and its minimum with
-    the modes that an expansion tells."""
+    the modes of an expansion."""
     base = load_scenario("throttle_steps")
     sensors = [
         replace(one, rate=50.0, window=window)
