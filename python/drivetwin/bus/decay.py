@@ -83,15 +83,18 @@ class DecayRecord:
     floor: float
     torque: Signal | None = None
     late: float = 0.0
+    averaged: FloatArray | None = None
+    """Times (n, w) [s] of the samples of each mean, None where each value is one sample."""
 
     def build_columns(self, swing: Swing) -> FloatArray:
         """Columns (n, 4) of trend and oscillation, two more of a torque."""
-        columns = build_columns(self.time, swing)
-        if self.torque is None:
-            return columns
-        impulse = integrate_torque(self.torque, self.start + self.time + self.late)
-        driven = compute_swing_response(self.start + self.time, self.torque, self.late, swing)
-        return np.column_stack([columns, impulse, driven])
+        time = self.time if self.averaged is None else self.averaged.ravel()
+        columns = build_columns(time, swing)
+        if self.torque is not None:
+            impulse = integrate_torque(self.torque, self.start + time + self.late)
+            driven = compute_swing_response(self.start + time, self.torque, self.late, swing)
+            columns = np.column_stack([columns, impulse, driven])
+        return average_neighbours(columns, time.size // self.time.size)
 
     def thin(self, swing: Swing) -> DecayRecord:
         """Return means of neighbours, so many that they still resolve the oscillation."""
@@ -99,9 +102,14 @@ class DecayRecord:
         fine = int(2.0 * np.pi / swing.omega / DECAY.per_period / step)
         width = max(1, min(fine, self.time.size // DECAY.samples))
         time, values = (average_neighbours(one, width) for one in (self.time, self.values))
-        start = self.start + float(time[0])
-        floor = self.floor / float(np.sqrt(width))
-        return replace(self, start=start, time=time - time[0], values=values, floor=floor)
+        return replace(
+            self,
+            start=self.start + float(time[0]),
+            time=time - time[0],
+            values=values,
+            floor=self.floor / float(np.sqrt(width)),
+            averaged=(self.time[: time.size * width] - time[0]).reshape(-1, width),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,8 +64,9 @@ class Signal:
 
 
 def average_neighbours(samples: FloatArray, width: int) -> FloatArray:
-    """Average `width` neighbours each; return (n // width,) means of (n,) samples."""
-    return np.asarray(samples[: samples.size // width * width].reshape(-1, width).mean(axis=1))
+    """Average `width` neighbours each; return (n // width, ...) means of (n, ...) samples."""
+    count = len(samples) // width
+    return np.asarray(samples[: count * width].reshape(count, width, *samples.shape[1:]).mean(1))
 
 
 @dataclass(frozen=True, eq=False)

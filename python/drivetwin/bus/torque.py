@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -65,10 +66,10 @@ TORQUE = TorqueSettings()
 
 @dataclass(frozen=True, eq=False)
 class TorqueSpan:
-    """A span with `speed` at `time` (n,) [rad/s], on the clock of the input speed.
+    """A span of samples at `time` (n,) [s], on the clock of the input speed.
 
-    `ratio` multiplies the torque: 1 for the open clutch, i in gear. `swing` is the oscillator of
-    the gear.
+    `speed` (n // width,) [rad/s] are means of `width` samples each. `ratio` times the torque acts:
+    1 for the open clutch, i in gear. `swing` is the oscillator of the gear.
     """
 
     label: str
@@ -79,6 +80,12 @@ class TorqueSpan:
     torque: Signal
     ratio: float = 1.0
     swing: Swing | None = None
+    width: int = 1
+
+    @cached_property
+    def means(self) -> FloatArray:
+        """Mean times (n // width,) [s] of the speeds."""
+        return average_neighbours(self.time, self.width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +144,8 @@ def select_held(
         time, values = inlet.select((low, high))
         if time.size > 20 and torque.covers((low, high)):
             width = max(1, round(time.size / TORQUE.samples))
-            time, values = (average_neighbours(one, width) for one in (time, values))
-            floor = inlet.floor / ratio
-            found.append(TorqueSpan(label, gear, time, values / ratio, floor, torque, ratio, swing))
+            speed, floor = average_neighbours(values, width) / ratio, inlet.floor / ratio
+            found.append(TorqueSpan(label, gear, time, speed, floor, torque, ratio, swing, width))
     return found
 
 
@@ -238,7 +244,7 @@ def _fit_span(
 
     `scale` is 1/J [1/(kg m^2)], by which errors of the torque become such of the speed.
     """
-    time = one.time - one.time[0]
+    time = one.means - one.means[0]
     wanted, other = _build_columns(one, late, size, share)
     columns = np.column_stack([wanted, other])
     basis, strength, _ = np.linalg.svd(
@@ -279,7 +285,7 @@ def _build_message_covariance(one: TorqueSpan, late: float) -> FloatArray:
     A torque that bends by δ from one message to the next may have stepped by δ at any instant
     between two of them: the impulse of a line then has an error of δ·Δt/√12.
     """
-    shown = one.time + late
+    shown = one.means + late
     first = max(int(np.searchsorted(one.torque.time, shown[0])) - 1, 1)
     last = min(int(np.searchsorted(one.torque.time, shown[-1])) + 1, one.torque.time.size - 2)
     if last <= first:
@@ -295,7 +301,7 @@ def _build_message_covariance(one: TorqueSpan, late: float) -> FloatArray:
 def _build_columns(
     one: TorqueSpan, late: float, size: int, share: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Columns of 1/J, the step of d/J and T_0/J (n, size), and those of no interest (n, m).
+    """Columns of 1/J, the step of d/J and T_0/J (k, size), and those of no interest (k, m).
 
     The last of the latter is the swing that the torque causes. It has `share` times the coefficient
     of 1/J, and moves with the dead time too.
@@ -316,7 +322,9 @@ def _build_columns(
         other += [fall * np.cos(angle), fall * np.sin(angle)]
         response = compute_swing_response(one.time, one.torque, late, one.swing)
         other.append(one.ratio * response)
-    return np.column_stack(wanted), np.column_stack(other)
+    both = (np.column_stack(columns) for columns in (wanted, other))
+    mean_wanted, mean_other = (average_neighbours(columns, one.width) for columns in both)
+    return mean_wanted, mean_other
 
 
 def _differentiate_swing(one: TorqueSpan, late: float) -> FloatArray:
