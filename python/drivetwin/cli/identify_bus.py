@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,35 +13,11 @@ from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
 
 if TYPE_CHECKING:
-    from drivetwin.bus.identify import BusIdentification
     from drivetwin.channels.shiftlog import ShiftLog
-    from drivetwin.files.bus_file import BusFile
-    from drivetwin.findings import Finding
-    from drivetwin.report.blocks import Block
+    from drivetwin.report.bus_outcome import BusOutcome
 
 BUS_RESULT = "bus.json"
 """Result that `identify -o` writes for bus logs."""
-
-
-@dataclass(frozen=True, eq=False)
-class BusOutcome:
-    """Result with the names of its logs and the remarks of the reader."""
-
-    logs: tuple[str, ...]
-    found: BusIdentification
-    remarks: tuple[Finding, ...]
-
-    def build_file(self, settings: Mapping[str, str]) -> BusFile:
-        """Build the result file."""
-        from drivetwin.files.bus_file import build_bus_file
-
-        return build_bus_file(self.found, self.logs, self.remarks, settings)
-
-    def build_blocks(self) -> list[Block]:
-        """Build the blocks of the terminal."""
-        from drivetwin.report.bus import build_bus_blocks
-
-        return build_bus_blocks(self.found, self.remarks)
 
 
 def identify_bus_logs(
@@ -56,7 +31,7 @@ def identify_bus_logs(
 
     Raises the typed errors of the readers, and InputError for what needs a whole vehicle card.
     """
-    from drivetwin.bus.identify import identify_bus
+    from drivetwin.report.bus_outcome import identify_vehicle
     from drivetwin.vehicle.ratio_card import load_ratio_card
 
     if strict:
@@ -69,12 +44,9 @@ def identify_bus_logs(
     held = _find_held(hold_out, logs)
     card = None if vehicle is None else load_ratio_card(vehicle)
     with show_step(f"reading {len(logs)} logs"):
-        read = {path: _read(path, channels, vehicle) for path in logs}
-    fitted = [log for path, log in read.items() if path not in held]
+        read = [_read(path, channels, vehicle) for path in logs]
     with show_step("identifying"):
-        found = identify_bus(fitted, card, [read[path] for path in held])
-    remarks = tuple(dict.fromkeys(one for log in read.values() for one in log.findings))
-    return BusOutcome(tuple(path.name for path in logs), found, remarks)
+        return identify_vehicle(read, card, [logs.index(path) for path in held])
 
 
 def _read(path: Path, channels: Path | None, vehicle: Path | None) -> ShiftLog:
@@ -114,10 +86,6 @@ def _find_held(wanted: Sequence[str], logs: Sequence[Path]) -> list[Path]:
 def write_bus(outcome: BusOutcome, folder: Path, settings: Mapping[str, str]) -> tuple[Path, ...]:
     """Write result and report into `folder`, all or none; returns their paths."""
     from drivetwin.cli.atomic_outputs import write_texts
-    from drivetwin.report.bus import render_bus
 
-    texts = {
-        BUS_RESULT: outcome.build_file(settings).to_json(),
-        REPORT: render_bus(outcome.found, outcome.logs, outcome.remarks),
-    }
+    texts = {BUS_RESULT: outcome.build_file(settings).to_json(), REPORT: outcome.render()}
     return write_texts(folder, texts)

@@ -39,6 +39,13 @@ def render_bus(
     found: BusIdentification, logs: Sequence[str], remarks: Sequence[Finding] = ()
 ) -> str:
     """HTML text of the page; equal results give equal text."""
+    title = f"Bus logs: {', '.join(logs)}"
+    subtitle = f"{len(logs)} logs · {len(found.shifts)} shifts"
+    return render_page(title, subtitle, build_bus_sections(found, remarks))
+
+
+def build_bus_sections(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Section]:
+    """Build the sections of a result: quantities, findings, shifts, decays, predictions."""
     sections = [
         Section("result", "Result", "", [_build_tiles(found), *_build_parameters(found)]),
         build_findings_section((*remarks, *found.findings)),
@@ -61,9 +68,7 @@ def render_bus(
             [*_build_predictions(found), *_build_prediction_table(found)],
         ),
     ]
-    title = f"Bus logs: {', '.join(logs)}"
-    subtitle = f"{len(logs)} logs · {len(found.shifts)} shifts"
-    return render_page(title, subtitle, [one for one in sections if one.blocks])
+    return [one for one in sections if one.blocks]
 
 
 def build_bus_blocks(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Block]:

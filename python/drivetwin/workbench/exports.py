@@ -14,8 +14,9 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.export.targets import Target
 from drivetwin.export.write import ExportedModel, ExportOptions, write_export
 from drivetwin.files.twin_file import save_twin
+from drivetwin.report.bus_outcome import BusOutcome
 from drivetwin.workbench import jobs, what_if
-from drivetwin.workbench.identifying import render_log_report
+from drivetwin.workbench.identifying import render_bus_report, render_log_report
 from drivetwin.workbench.session_state import SessionState
 
 REPORT_LIMIT = 120.0
@@ -30,6 +31,10 @@ class Record(StrEnum):
     REPORT = "report.html"
     MAPPING = "channels.toml"
     SIGNALS = "signals.csv"
+
+
+_BUS_NAMES = {Record.RESULT: "bus.json", Record.REPORT: "report.html"}
+"""Files of a result of bus logs."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,9 @@ def make_product(work: SessionState, wanted: ExportOptions | Record, scratch: Pa
     """
     stem = Path(work.log.name).stem if work.log is not None else "twin"
     if isinstance(wanted, Record):
+        if work.bus is not None and wanted in _BUS_NAMES:
+            content = _make_bus_record(work.bus, wanted)
+            return Product(f"{stem}.{_BUS_NAMES[wanted]}", content)
         return Product(f"{stem}.{wanted.value}", _make_record(work, wanted, scratch))
     path = scratch / f"{stem}.{wanted.to.ending}"
     write_export(work.require_twin(), wanted, path, lambda: _load_model(work))
@@ -62,6 +70,13 @@ def _load_model(work: SessionState) -> ExportedModel:
     twin, shift = work.require_twin(), work.require_shift()
     gears = shift.start_gear, shift.end_gear
     return ExportedModel(*build_measured_subject(twin, work.require_log(), gears))
+
+
+def _make_bus_record(outcome: BusOutcome, wanted: Record) -> bytes:
+    if wanted is Record.RESULT:
+        return outcome.build_file().to_json().encode()
+    text: str = jobs.call(render_bus_report, outcome, limit=REPORT_LIMIT)
+    return text.encode()
 
 
 def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:

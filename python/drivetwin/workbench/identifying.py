@@ -6,14 +6,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from drivetwin._util.progress import TimedStages
+from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
+from drivetwin.report.bus_outcome import BusOutcome, identify_vehicle
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.multi_log import Source, identify_together
 from drivetwin.vehicle.card import VehicleCard
+from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.workbench.jobs import Emit, to_fault
 
 _STAGES = TimedStages("methods", tuple(one.value for one in Method))
@@ -79,6 +81,26 @@ def _run_method(task: Task, method: Method) -> Outcome | Refusal:
     except Exception as error:
         fault = to_fault(error)
         return Refusal(method, f"{fault.what} -> {fault.remedy}")
+
+
+@dataclass(frozen=True, eq=False)
+class BusTask:
+    """Input of an identification of bus logs; `held` are the indices of the logs to predict."""
+
+    logs: Sequence[ShiftLog]
+    card: RatioCard
+    held: frozenset[int] = frozenset()
+
+
+def identify_bus_logs(emit: Emit, task: BusTask) -> None:
+    """Identify one vehicle from its bus logs; emits a BusOutcome."""
+    notify_progress(0.0, "all shifts of the bus logs")
+    emit(identify_vehicle(task.logs, task.card, task.held))
+
+
+def render_bus_report(emit: Emit, outcome: BusOutcome) -> None:
+    """Emit the report of bus logs as HTML."""
+    emit(outcome.render())
 
 
 def render_log_report(emit: Emit, found: Identification, logs: Sequence[ShiftLog]) -> None:

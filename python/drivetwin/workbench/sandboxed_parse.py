@@ -38,6 +38,7 @@ from drivetwin.logs.survey import Survey, find_shortest_step, survey_recording
 from drivetwin.plausibility.check import check_card, drop_card_findings, select_card_findings
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import VehicleCard, load_card
+from drivetwin.vehicle.ratio_card import RatioCard, is_ratio_card, load_ratio_card
 from drivetwin.workbench.jobs import Emit
 from drivetwin.workbench.mapping import Corrections
 
@@ -47,6 +48,7 @@ class Opened:
     """Contents of a log, and the mapping it was read with.
 
     `card` is None as long as none is open: pressures then have the labels of their columns.
+    `ratios` is a card of the ratios alone, of a bus log; `card` and `found` are then None.
     `log` and `found` are None if the log cannot be read as mapped; `fault` then holds the reason.
     `found` is also None without a card. `doubts` are the implausible entries of the card.
     `time_units` are proposed where the file names no unit of time.
@@ -59,6 +61,7 @@ class Opened:
     doubts: tuple[Finding, ...] = ()
     fault: str = ""
     time_units: tuple[Proposal, ...] = ()
+    ratios: RatioCard | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
     """
     limit_memory(compute_parser_limits(request.log).memory)
     with _apply_labels(_get_labels(request)):
-        card = _load_card(request)
+        card, ratios = _load_card(request)
         stated = _read_stated(request, card)
         try:
             looked, names, stated, _ = _survey(request.log, card, stated)
@@ -114,7 +117,7 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
                 raise
             opened = _open_without_time_unit(request.log, card, stated)
             fault = _apply_labels_to(error, _get_labels(request))
-            emit(replace(opened, fault=fault.format_for_shell()))
+            emit(replace(opened, fault=fault.format_for_shell(), ratios=ratios))
             return
     try:
         with _apply_labels(_get_labels(request)):
@@ -126,10 +129,10 @@ def open_log(emit: Emit, request: Request, scratch: Path) -> None:
                 log = replace(log, findings=drop_card_findings(log.findings))
             found = None if card is None else detect_shifts(log, card)
     except InputError as error:
-        emit(Opened(looked, card, fault=error.format_for_shell()))
+        emit(Opened(looked, card, fault=error.format_for_shell(), ratios=ratios))
         return
     doubts = () if card is None or found is None else _check_card(card, log, found)
-    emit(Opened(looked, card, log, found, doubts))
+    emit(Opened(looked, card, log, found, doubts, ratios=ratios))
 
 
 def _survey(
@@ -202,10 +205,13 @@ def _get_labels(request: Request) -> dict[Path, str]:
     return labels if request.card is None else {**labels, request.card: request.card_label}
 
 
-def _load_card(request: Request) -> VehicleCard | None:
+def _load_card(request: Request) -> tuple[VehicleCard | None, RatioCard | None]:
+    """Load the card of the request: of a vehicle, or of the ratios alone."""
     if request.card is None:
-        return None
-    return replace(load_card(request.card), source=request.card_label)
+        return None, None
+    if is_ratio_card(request.card):
+        return None, replace(load_ratio_card(request.card), source=request.card_label)
+    return replace(load_card(request.card), source=request.card_label), None
 
 
 def _read_stated(request: Request, card: VehicleCard | None) -> Mapped:

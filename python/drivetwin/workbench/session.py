@@ -32,7 +32,7 @@ from drivetwin.report.figure import Figure
 from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
 from drivetwin.workbench.card_form import CardForm
-from drivetwin.workbench.identifying import Task, identify_all
+from drivetwin.workbench.identifying import Task, identify_all, identify_bus_logs
 from drivetwin.workbench.mapping import Corrections, Entry, apply_entries
 from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
@@ -245,11 +245,19 @@ class Session:
             self.work = self.work.set_lock(parameter_id, lock)
 
     def identify(self, methods: Sequence[Method]) -> None:
-        """Start the identification in a separate process. Raises InputError on failure."""
+        """Start the identification in a separate process; bus logs have one method.
+
+        Raises InputError on failure.
+        """
         with self.lock:
             if self.job is not None:
                 raise InputError("an identification is running", "wait for it or cancel it")
             work = self.work
+            if work.ratios is not None:
+                bus = work.build_bus_task()
+                self._set(work.drop_results())
+                self.job = jobs.start(identify_bus_logs, bus)
+                return
             task = Task(work.build_sources(), work.apply_locks_to_card(), tuple(methods))
             self._set(work.drop_results())
             self.job = jobs.start(identify_all, task)

@@ -10,13 +10,15 @@ from pathlib import Path
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.report.bus_outcome import BusOutcome
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.multi_log import Source as FitSource
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
-from drivetwin.workbench.identifying import Outcome, Refusal
+from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.workbench.identifying import BusTask, Outcome, Refusal
 from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.phases import Boundary, move_boundaries
 from drivetwin.workbench.sandboxed_parse import Opened
@@ -39,7 +41,8 @@ class OpenLog:
     """A log as read.
 
     `corrections` are those of the mapping, `moves` the boundaries set by hand [s] by index of the
-    shift. `held` are the indices of the shifts that are predicted instead of fitted.
+    shift. `held` are the indices of the parts that are predicted instead of fitted: shifts, or 0
+    for a bus log, which is held out whole.
     """
 
     source: Source
@@ -54,6 +57,11 @@ class OpenLog:
     def fitted(self) -> tuple[Shift, ...]:
         """The shifts that are not held out."""
         return tuple(one for k, one in enumerate(self.shifts) if k not in self.held)
+
+    @property
+    def parts(self) -> int:
+        """Number of parts that can be held out."""
+        return len(self.shifts) if self.opened.ratios is None else 1
 
     def require_log(self) -> ShiftLog:
         """Return the channels; raise InputError if the log cannot be read."""
@@ -85,8 +93,8 @@ class SessionState:
     `at` selects one of the `logs`: the views show its channels, phases and simulation. `method` and
     `shift` select the result and the shift of the sliders; `changes` are the sliders (SI) that
     differ from the identified values. `ended` is the reason why the last identification ended
-    before its last method; empty if it was completed. `has_viewed` and `has_exported` state whether
-    the result was looked at in the step Model, and exported.
+    before its last method; empty if it was completed. `bus` is the result of bus logs. `has_viewed`
+    and `has_exported` state whether the result was looked at in the step Model, and exported.
     """
 
     logs: tuple[OpenLog, ...] = ()
@@ -96,6 +104,7 @@ class SessionState:
     results: Mapping[Method, Outcome] = field(default_factory=dict)
     refusals: Mapping[Method, str] = field(default_factory=dict)
     ended: str = ""
+    bus: BusOutcome | None = None
     method: Method | None = None
     shift: int = 0
     changes: Mapping[str, float] = field(default_factory=dict)
@@ -121,6 +130,11 @@ class SessionState:
     def all_shifts(self) -> tuple[Shift, ...]:
         """Shifts of all logs."""
         return tuple(shift for one in self.logs for shift in one.shifts)
+
+    @property
+    def ratios(self) -> RatioCard | None:
+        """The card of the ratios alone that is open; None without one."""
+        return self.logs[self.at].opened.ratios if self.logs else None
 
     @property
     def verdict_outcome(self) -> Outcome | None:
@@ -149,8 +163,7 @@ class SessionState:
     def hold_out(self, held: Sequence[frozenset[int]]) -> SessionState:
         """Set the indices of the shifts to predict, log by log. Raises InputError."""
         if len(held) != len(self.logs) or any(
-            not own <= set(range(len(one.shifts)))
-            for own, one in zip(held, self.logs, strict=False)
+            not own <= set(range(one.parts)) for own, one in zip(held, self.logs, strict=False)
         ):
             raise InputError("there is no such shift", "choose one of the shifts of the log")
         logs = (replace(one, held=own) for one, own in zip(self.logs, held, strict=True))
@@ -172,12 +185,14 @@ class SessionState:
     def drop_results(self) -> SessionState:
         """Before an identification."""
         return replace(
-            self, results={}, refusals={}, ended="", method=None, changes={},
+            self, results={}, refusals={}, ended="", bus=None, method=None, changes={},
             has_viewed=False, has_exported=False,
         )  # fmt: skip
 
-    def add_result(self, result: Outcome | Refusal) -> SessionState:
+    def add_result(self, result: Outcome | Refusal | BusOutcome) -> SessionState:
         """With what one method found, which is shown from now on."""
+        if isinstance(result, BusOutcome):
+            return replace(self, bus=result)
         if isinstance(result, Refusal):
             return replace(self, refusals={**self.refusals, result.method: result.text})
         results = {**self.results, result.method: result}
@@ -216,6 +231,19 @@ class SessionState:
             if one.shifts
         ]
 
+    def build_bus_task(self) -> BusTask:
+        """Build the input of an identification of bus logs.
+
+        Raises InputError without a card of the ratios, for a log that cannot be read, and if all
+        logs are held out.
+        """
+        if self.ratios is None:
+            raise InputError("no card of the ratios is open", "open one in the step Card")
+        held = frozenset(k for k, one in enumerate(self.logs) if one.held)
+        if len(held) == len(self.logs):
+            raise InputError("every log is held out", "fit at least one in the step Shifts")
+        return BusTask([one.require_log() for one in self.logs], self.ratios, held)
+
     def require_opened(self) -> Opened:
         """Return the contents of the selected log; raise InputError if none is open."""
         return self.require_open_log().opened
@@ -243,6 +271,11 @@ class SessionState:
 
     def require_outcome(self) -> Outcome:
         """The result that is shown; raises InputError before an identification."""
+        if self.bus is not None:
+            raise InputError(
+                "bus logs give quantities, but no model",
+                "download report and result; a model needs a vehicle card and an output torque",
+            )
         if self.method is None:
             raise InputError("nothing is identified yet", "press Identify in the step Identify")
         return self.results[self.method]

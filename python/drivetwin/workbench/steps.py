@@ -104,8 +104,13 @@ def _assess_channels(work: SessionState) -> StepState:
 
 def _assess_card(work: SessionState) -> StepState:
     opened = work.require_opened()
+    if opened.ratios is not None:
+        name = opened.ratios.name or opened.ratios.source
+        text = f"{name} is open: ratios of {len(opened.ratios.ratios)} gears."
+        return StepState(Step.CARD, Status.DONE, text)
     if opened.card is None:
-        return StepState(Step.CARD, Status.OPEN, "Open a vehicle card, or write one.")
+        text = "Open a vehicle card, or write one; for bus logs a card of the ratios is enough."
+        return StepState(Step.CARD, Status.OPEN, text)
     name = work.card.name if work.card is not None else opened.card.name
     count = len(opened.doubts)
     doubt = f"; {count} {'remark' if count == 1 else 'remarks'}" if count else ""
@@ -116,12 +121,23 @@ def _assess_shifts(work: SessionState) -> StepState:
     opened = work.require_opened()
     if fault := _find_unreadable(work):
         return StepState(Step.SHIFTS, Status.BLOCKED, fault, Step.CHANNELS)
+    if opened.ratios is not None:
+        return StepState(Step.SHIFTS, Status.DONE, _describe_bus_shifts(work))
     if opened.card is None:
         return StepState(Step.SHIFTS, Status.BLOCKED, "No vehicle card is open.", Step.CARD)
     if not work.all_shifts:
         text = "The log has no usable shift. The reasons are below."
         return StepState(Step.SHIFTS, Status.BLOCKED, text, Step.CARD, has_content=True)
     return StepState(Step.SHIFTS, Status.DONE, _describe_shifts(work))
+
+
+def _describe_bus_shifts(work: SessionState) -> str:
+    held = sum(bool(one.held) for one in work.logs)
+    tail = f", {held} {'log' if held == 1 else 'logs'} held out." if held else "."
+    if work.bus is None:
+        return f"The identification finds the shifts of the bus logs{tail}"
+    count = len(work.bus.found.shifts)
+    return f"{count} {'shift' if count == 1 else 'shifts'} found{tail}"
 
 
 def _describe_shifts(work: SessionState) -> str:
@@ -140,6 +156,8 @@ def _assess_identification(work: SessionState, running: bool) -> StepState:
         return StepState(Step.IDENTIFY, Status.RUNNING, "The identification is running.")
     if fault := _find_unreadable(work):
         return StepState(Step.IDENTIFY, Status.BLOCKED, fault, Step.CHANNELS)
+    if work.ratios is not None:
+        return _assess_bus(work)
     if not work.all_shifts:
         return StepState(Step.IDENTIFY, Status.BLOCKED, "There is no shift.", Step.SHIFTS)
     if not any(one.fitted for one in work.logs):
@@ -150,6 +168,19 @@ def _assess_identification(work: SessionState, running: bool) -> StepState:
     if DEFAULT_METHOD in work.refusals or work.ended:
         return StepState(Step.IDENTIFY, Status.OPEN, "The identification failed.")
     return StepState(Step.IDENTIFY, Status.OPEN, "Press Identify.")
+
+
+def _assess_bus(work: SessionState) -> StepState:
+    """Return the state of the identification of bus logs."""
+    if work.bus is not None:
+        verdicts = [one.verdict for one in work.bus.found.estimates.values()]
+        count = verdicts.count(Verdict.IDENTIFIED)
+        text = f"{count} of {len(verdicts)} quantities identified."
+        return StepState(Step.IDENTIFY, Status.DONE, text)
+    if all(one.held for one in work.logs):
+        return StepState(Step.IDENTIFY, Status.BLOCKED, "Every log is held out.", Step.SHIFTS)
+    text = "The identification failed." if work.ended else "Press Identify."
+    return StepState(Step.IDENTIFY, Status.OPEN, text)
 
 
 def _assess_outcome(outcome: Outcome) -> StepState:
@@ -167,6 +198,10 @@ def _assess_outcome(outcome: Outcome) -> StepState:
 
 def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:
     """Yield the states of model and export, which need a finished identification."""
+    if not running and work.bus is not None:
+        yield StepState(Step.MODEL, Status.BLOCKED, "Bus logs give quantities, but no model.")
+        yield _assess_export(work)
+        return
     if running or work.method is None:
         text = "The identification is running." if running else "Nothing is identified."
         for step in (Step.MODEL, Step.EXPORT):
@@ -179,7 +214,11 @@ def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:
         yield StepState(Step.MODEL, Status.DONE, text)
     else:
         yield StepState(Step.MODEL, Status.OPEN, "Compare simulation and measurement.")
+    yield _assess_export(work)
+
+
+def _assess_export(work: SessionState) -> StepState:
     if work.has_exported:
-        yield StepState(Step.EXPORT, Status.DONE, "A file was exported.")
-    else:
-        yield StepState(Step.EXPORT, Status.OPEN, "Download report or model.")
+        return StepState(Step.EXPORT, Status.DONE, "A file was exported.")
+    files = "report or model" if work.bus is None else "report or result"
+    return StepState(Step.EXPORT, Status.OPEN, f"Download {files}.")

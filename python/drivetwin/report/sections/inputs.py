@@ -11,6 +11,7 @@ from drivetwin.report.blocks import TableBlock, make_table
 
 if TYPE_CHECKING:
     from drivetwin.logs.survey import Column
+    from drivetwin.vehicle.ratio_card import RatioCard
     from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -49,5 +50,19 @@ def build_card_tables(card: VehicleCard) -> list[TableBlock]:
     return [
         make_table("Gears", ("gear", ("ratio", ".4g"), "elements"), gears),
         make_table("Shift elements", heads, elements),
+        make_table(card.name, ("quantity", "value"), facts),
+    ]
+
+
+def build_ratio_tables(card: RatioCard) -> list[TableBlock]:
+    """Build the tables of a card of the ratios alone."""
+    gears = [(gear, one.value) for gear, one in card.ratios.items()]
+    final, radius = card.final_drive, card.wheel_radius
+    facts = [
+        ("Final drive", "not stated" if final is None else f"{final.value:.4g}"),
+        ("Wheel radius", "not stated" if radius is None else f"{radius:.4g} m"),
+    ]
+    return [
+        make_table("Gears", ("gear", ("ratio", ".4g")), gears),
         make_table(card.name, ("quantity", "value"), facts),
     ]

@@ -11,7 +11,7 @@ from dash import Input, Output, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.findings import render
-from drivetwin.report.sections.inputs import build_card_tables
+from drivetwin.report.sections.inputs import build_card_tables, build_ratio_tables
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
@@ -33,6 +33,8 @@ _TABLES = tuple(
     for one in (rb"(?:\[\[[ \t]*gears\b|gears[ \t]*=)", rb"(?:\[[ \t]*inertia\b|inertia[ \t]*[.=])")
 )
 """Tables that a vehicle card has, and a gearbox card, a mapping or a twin has not."""
+_OTHERS = re.compile(rb"^[ \t]*\[{1,2}[ \t]*(?![\[ \t]|gears\b|final_drive\b)", re.MULTILINE)
+"""Head of a table that a card of the ratios alone has not."""
 
 
 def layout() -> list[Component]:
@@ -40,7 +42,7 @@ def layout() -> list[Component]:
     return [
         ui.make_hint(
             "The vehicle card has the design data: gears, shift elements, ranges of inertias and "
-            "the tolerances of the sensors."
+            "the tolerances of the sensors. Bus logs need a card of the ratios alone."
         ),
         ui.make_row(
             html.Div(
@@ -91,16 +93,21 @@ def open_card(session: Session, source: Source) -> None:
 
 
 def is_card(path: Path) -> bool:
-    """Return True for a file that has the tables of a vehicle card; it may still have faults."""
+    """Return True for a file that has the tables of a vehicle card or those of a card of the ratios
+    alone; it may still have faults."""
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError:
         return False
-    return all(one.search(head) for one in _TABLES)
+    gears, inertia = (one.search(head) for one in _TABLES)
+    return bool(gears and (inertia or not _OTHERS.search(head)))
 
 
 def _build_content(opened: Opened) -> list[Component]:
+    if opened.ratios is not None:
+        tables = [render_table(one) for one in build_ratio_tables(opened.ratios)]
+        return [html.Div(tables, className="columns")]
     if opened.card is None:
         return []
     doubts = map(replace_options, render(opened.doubts))

@@ -61,7 +61,7 @@ def parse_choices(
 RECORDS = {
     Record.REPORT: ("Report", "one offline page with all evidence"),
     Record.TWIN: ("Twin", "twin.toml, for simulate, report and export"),
-    Record.RESULT: ("Result", "result.json, for other programs"),
+    Record.RESULT: ("Result", "result.json, or bus.json of bus logs, for other programs"),
     Record.SIGNALS: ("Signals", "measured and simulated, of the shift and sliders in Model (CSV)"),
     Record.MAPPING: ("Channel mapping", "channels.toml, for logs of the same logger"),
 }

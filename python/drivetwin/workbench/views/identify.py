@@ -98,7 +98,7 @@ def _register_buttons(page: ui.Page) -> None:
         """Begin the identification."""
         session.identify(_METHODS[kind])
         ui.notify("")
-        ui.notify_topic(ui.Topic.RESULTS)
+        _notify_results(session)
 
     @page.callback(Input("cancel", "n_clicks"))
     def cancel(session: Session, _: object) -> None:
@@ -106,6 +106,13 @@ def _register_buttons(page: ui.Page) -> None:
         session.cancel()
         ui.notify("The identification was cancelled")
         ui.notify_topic(ui.Topic.RESULTS)
+
+
+def _notify_results(session: Session) -> None:
+    """Redraw the results, and the shifts of bus logs, which are part of them."""
+    ui.notify_topic(ui.Topic.RESULTS)
+    if session.work.ratios is not None:
+        ui.notify_topic(ui.Topic.PHASES)
 
 
 def _register_progress(page: ui.Page) -> None:
@@ -118,7 +125,7 @@ def _register_progress(page: ui.Page) -> None:
         """Take in results as they come."""
         try:
             if session.collect_job_results():
-                ui.notify_topic(ui.Topic.RESULTS)
+                _notify_results(session)
         except Exception:
             ui.notify_topic(ui.Topic.RESULTS)
             raise
@@ -149,6 +156,8 @@ def _register_progress(page: ui.Page) -> None:
 
 def _build_content(work: SessionState, *, running: bool) -> list[Component]:
     """Build the result of the default method once its run is finished, and what a run takes."""
+    if work.ratios is not None:
+        return _build_bus_content(work, running=running)
     if not work.all_shifts:
         return []
     content: list[Component] = []
@@ -156,9 +165,7 @@ def _build_content(work: SessionState, *, running: bool) -> list[Component]:
         methods = [method.value for method, why in work.refusals.items() if why == text]
         title = f"Identification failed: {', '.join(methods)} method"
         content.append(ui.make_notes(title, [replace_options(text)]))
-    if work.ended:
-        ended = [replace_options(work.ended)]
-        content.append(ui.make_notes("The identification ended early", ended))
+    content += _build_end(work)
     if not running and work.verdict_outcome is not None:
         content += _build_result(work.verdict_outcome)
     elif work.results:
@@ -173,6 +180,24 @@ def _build_content(work: SessionState, *, running: bool) -> list[Component]:
     if not running and work.method is None:
         content.append(_build_known(work))
     return content
+
+
+def _build_end(work: SessionState) -> list[Component]:
+    """Build the reason of an identification that ended early."""
+    ended = [replace_options(work.ended)] if work.ended else []
+    return [ui.make_notes("The identification ended early", ended)] if ended else []
+
+
+def _build_bus_content(work: SessionState, *, running: bool) -> list[Component]:
+    """Build the result of bus logs with the sections of their report."""
+    content = _build_end(work)
+    if work.bus is None:
+        hint = "Bus logs with a card of the ratios: all shifts of all logs together, one method."
+        return [*content, ui.make_hint(hint)]
+    if running:
+        return content
+    sections = work.bus.build_sections()
+    return content + [part for one in sections for part in render_section(one, f"bus-{one.anchor}")]
 
 
 def _build_known(work: SessionState) -> Component:

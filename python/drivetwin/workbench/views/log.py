@@ -122,7 +122,7 @@ def _list_logs(work: SessionState) -> list[Component]:
         (
             one.source.name,
             "cannot be read" if one.opened.log is None else str(len(one.opened.log.channels)),
-            str(len(one.shifts)),
+            str(len(one.shifts)) if one.opened.ratios is None else "–",
         )
         for one in work.logs
     ]

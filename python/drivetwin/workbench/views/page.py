@@ -217,4 +217,6 @@ def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
             parts.append(f" · shift {shift.name}")
         if work.results:
             parts.append(f" · identified: {', '.join(method.value for method in work.results)}")
+        if work.bus is not None:
+            parts.append(f" · identified: {len(work.bus.found.shifts)} shifts of bus logs")
         return [*parts, f" · {access.describe()}"]

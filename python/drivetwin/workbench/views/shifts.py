@@ -12,6 +12,7 @@ from dash.development.base_component import Component
 
 from drivetwin.findings import render
 from drivetwin.report.blocks import TableBlock, make_table
+from drivetwin.report.bus import build_phase_table as build_bus_phases
 from drivetwin.report.figures.recording import build_shift_panels
 from drivetwin.report.figures.stack import Panel
 from drivetwin.report.sections.summary import build_phase_table, describe_phases
@@ -46,6 +47,7 @@ _HOLD_OUT = (
     "Shifts held out take no part in the fit. The model identified from the others predicts them, "
     "and the step Identify compares the prediction with the measurement."
 )
+_HOLD_OUT_BUS = "The decays of a log held out are predicted by the other logs."
 
 
 def layout() -> list[Component]:
@@ -103,21 +105,23 @@ def _register_uses(page: ui.Page) -> None:
         chosen = {one.id for one, use in zip(ids, uses, strict=True) if use is Use.HOLD_OUT}
         logs = session.work.logs
         held = [
-            frozenset(k for k in range(len(one.shifts)) if _make_use_id(at, k) in chosen)
+            frozenset(k for k in range(one.parts) if _make_use_id(at, k) in chosen)
             for at, one in enumerate(logs)
         ]
         if not ids or held == [one.held for one in logs]:
             return
         session.hold_out(held)
         ui.notify_topic(ui.Topic.HELD)
-        ui.notify(_describe_held_out(len(chosen)))
+        ui.notify(
+            _describe_held_out(len(chosen), "shift" if session.work.ratios is None else "log")
+        )
 
 
-def _describe_held_out(count: int) -> str:
+def _describe_held_out(count: int, part: str) -> str:
     if count == 0:
-        return "The next identification fits all shifts"
-    shifts = "1 shift" if count == 1 else f"{count} shifts"
-    return f"The next identification predicts {shifts} instead of fitting"
+        return f"The next identification fits all {part}s"
+    parts = f"1 {part}" if count == 1 else f"{count} {part}s"
+    return f"The next identification predicts {parts} instead of fitting"
 
 
 def _make_use_id(log: int, shift: int) -> str:
@@ -157,6 +161,8 @@ def _register_fields(page: ui.Page) -> None:
 
 def _build_shifts(work: SessionState) -> list[Component]:
     """List the shifts of all logs, and the reasons why other gear changes are not used."""
+    if work.ratios is not None:
+        return _build_bus_logs(work)
     rejected = [text for one in work.logs for text in _list_rejected(work, one)]
     if not work.all_shifts:
         return [ui.make_notes("No usable shift", rejected, "doubtful")]
@@ -177,6 +183,20 @@ def _build_shifts(work: SessionState) -> list[Component]:
         *([ui.make_hint(_HOLD_OUT)] if several else []),
         render_table(table, ["use"], uses) if several else render_table(table),
         ui.make_notes("Not used", rejected, "plain"),
+    ]
+
+
+def _build_bus_logs(work: SessionState) -> list[Component]:
+    """List the bus logs with their use, and the phases of their shifts once identified."""
+    shifts = [] if work.bus is None else [render_table(build_bus_phases(work.bus.found.timelines))]
+    if len(work.logs) < 2:
+        return shifts
+    rows = [(one.source.name,) for one in work.logs]
+    uses = [[_build_use(one.source.name, at, 0, 0 in one.held)] for at, one in enumerate(work.logs)]
+    return [
+        ui.make_hint(_HOLD_OUT_BUS),
+        render_table(make_table("Bus logs", ("log",), rows), ["use"], uses),
+        *shifts,
     ]
 
 
