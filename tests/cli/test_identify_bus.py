@@ -6,37 +6,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from drivetwin.cli import main
 from drivetwin.files.bus_file import BusFile
-
-RPM = 30.0 / np.pi
-
-
-def write_log(path: Path, seed: int, *, output_torque: bool = False) -> Path:
-    """A shift from ratio 2.6 to 1.9 with a decay of 3 Hz, in messages of 10 ms."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 5.0, 0.01)
-    output = 70.0 + 1.5 * time
-    ratio = np.interp(time, [1.0, 1.4], [2.6, 1.9])
-    later = np.maximum(time - 1.4, 0.0)
-    swing = 2.0 * np.exp(-1.5 * later) * np.sin(2.0 * np.pi * 3.0 * later)
-    inlet = ratio * output + swing
-    columns = {
-        "time [s]": time,
-        "input_speed [rpm]": RPM * inlet,
-        "output_speed [rpm]": RPM * inlet / ratio,
-        "gear [-]": np.where(time < 1.2, 1.0, 2.0),
-    }
-    if output_torque:
-        columns["output_torque [Nm]"] = np.full(time.size, 300.0) + rng.normal(0.0, 1.0, time.size)
-    table = np.column_stack(list(columns.values()))
-    table[:, 1:3] = np.round((table[:, 1:3] + rng.normal(0.0, 0.3, (time.size, 2))) / 0.125) * 0.125
-    rows = [",".join(f"{value:.6g}" for value in row) for row in table]
-    path.write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
-    return path
+from tests.support.bus_logs import write_log, write_ratio_card
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +21,7 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def card(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("card") / "ratios.toml"
-    gears = "".join(f'[[gears]]\nname = "{k}"\nratio = {i}\n' for k, i in ((1, 2.6), (2, 1.9)))
-    path.write_text(gears, encoding="utf-8")
-    return path
+    return write_ratio_card(tmp_path_factory.mktemp("card"))
 
 
 def test_all_logs_are_identified_as_one_vehicle(

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from html.parser import HTMLParser
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from dash import html
@@ -14,9 +16,11 @@ from drivetwin.drive import load_powertrain, plan_launch, run
 from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.gearbox import load_gearbox, reduce
+from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Column
 from drivetwin.report.blocks import Block, Section, TableBlock
 from drivetwin.report.brief import build_identification_blocks
+from drivetwin.report.bus_outcome import identify_vehicle
 from drivetwin.report.comparison import build_agreement_section, render_comparison
 from drivetwin.report.drive import build_energy_table, build_shift_table, render_drive
 from drivetwin.report.find_reports import Candidate
@@ -27,9 +31,11 @@ from drivetwin.report.sections.inputs import build_card_tables, build_column_tab
 from drivetwin.report.text import format_blocks
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_fit
+from drivetwin.vehicle.ratio_card import load_ratio_card
 from drivetwin.workbench.views.blocks import render_block
 from tests.estimation.multi_log.fixtures import together
 from tests.report.sample import card, identification, log, validation
+from tests.support.bus_logs import BUS_LOGS, RATIOS, write_bus_logs
 from tests.support.fits import fit_log, make_log
 from tests.workbench.views.texts import iterate_texts
 
@@ -48,6 +54,15 @@ def identify_jointly() -> Shown:
     """Two logs, and a shift that is predicted."""
     made = together()
     return build_identification_blocks(made.found), render_joint_report(made.found, made.fitted)
+
+
+def identify_bus() -> Shown:
+    """Bus logs of one vehicle, one of them predicted."""
+    with TemporaryDirectory() as name:
+        folder = write_bus_logs(Path(name))
+        logs = [read_log(folder / one, None) for one in BUS_LOGS]
+        made = identify_vehicle(logs, load_ratio_card(folder / RATIOS), held={2})
+    return made.build_blocks(), made.render()
 
 
 def fit() -> Shown:
@@ -159,7 +174,17 @@ def list_lines(row: Sequence[str]) -> Iterator[list[str]]:
         yield [word for cell in cells for word in "".join(cell[place : place + 1]).split()]
 
 
-SHOWN = (identify, identify_jointly, fit, drive, compare, reduce_gearbox, inspect, show_card)
+SHOWN = (
+    identify,
+    identify_jointly,
+    identify_bus,
+    fit,
+    drive,
+    compare,
+    reduce_gearbox,
+    inspect,
+    show_card,
+)
 
 
 @pytest.mark.parametrize("show", SHOWN, ids=lambda one: one.__name__)
