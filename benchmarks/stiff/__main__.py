@@ -32,9 +32,11 @@ Written by `python -m benchmarks.stiff`: inertias in a row on spring-dampers (1e
 10 N·m·s/rad), 1 s with a torque on the first that is linear between samples at 1 kHz. All programs
 run in turns in one run. Times are medians of processor time, so that other work on the machine
 counts little; runs of more than 5 s are measured once. Errors are the largest of all speeds at all
-samples against the exact motion, a matrix exponential in long double. The other programs get the
+samples against the exact motion, a matrix exponential in long double. The integrators get the
 exact Jacobian matrix, and the equations as a function in Python, as a user would write them; a
-member without mass is eliminated by hand for them.
+member without mass is eliminated by hand for them. `SciPy expm` is the exponential of the augmented
+matrix over one step and a loop over the samples in NumPy: exact for a linear driveline without
+events, of which clutches have several.
 """
 
 

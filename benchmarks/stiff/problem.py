@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,20 +96,31 @@ class Problem:
         b[0] = 1.0 / masses[0]
         return A, b
 
-    def solve_exactly(self) -> FloatArray:
-        """Return the speeds with inertia (n, places) by a matrix exponential in long double."""
+    def augment(self) -> FloatArray:
+        """Build the square matrix over the states, the torque and its slope, whose exponential
+        over a step is exact for a torque that is linear in it (Van Loan 1978)."""
         A, b = self.build_system()
-        size, step = len(A), TIME[1] - TIME[0]
-        whole = np.zeros((size + 2, size + 2), dtype=np.longdouble)
+        size = len(A)
+        whole = np.zeros((size + 2, size + 2))
         whole[:size, :size], whole[:size, size], whole[size, size + 1] = A, b, 1.0
-        power = _exponential(whole * np.longdouble(step))[:size]
-        x: NDArray[np.longdouble] = np.zeros(size, dtype=np.longdouble)
+        return whole
+
+    def march(self, power: NDArray[Any]) -> FloatArray:
+        """Return the speeds with inertia (n, places), given the exponential of the augmented matrix
+        over a step."""
+        size, step = len(power) - 2, TIME[1] - TIME[0]
+        x: NDArray[Any] = np.zeros(size, dtype=power.dtype)
         rows = [x]
         for now, then in pairwise(TORQUE):
-            given = np.array([now, (then - now) / step], dtype=np.longdouble)
-            x = power @ np.concatenate([x, given])
+            given = np.array([now, (then - now) / step], dtype=power.dtype)
+            x = power[:size] @ np.concatenate([x, given])
             rows.append(x)
         return np.array(rows)[:, : len(self.heavy)].astype(np.float64)
+
+    def solve_exactly(self) -> FloatArray:
+        """Return the speeds with inertia (n, places) by a matrix exponential in long double."""
+        step = np.longdouble(TIME[1] - TIME[0])
+        return self.march(_exponential(self.augment().astype(np.longdouble) * step))
 
 
 def _exponential(matrix: NDArray[np.longdouble]) -> NDArray[np.longdouble]:

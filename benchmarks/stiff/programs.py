@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from benchmarks.stiff.problem import TIME, TORQUE, Problem
 from drivetwin.simulation.dual_clutch import FloatArray
@@ -36,6 +37,7 @@ class Entry:
 def list_entries(problem: Problem) -> list[Entry]:
     """List the programs that are installed, drivetwin first."""
     entries = [Entry(problem, "drivetwin", "called from Python", _prepare_core(problem))]
+    entries.append(Entry(problem, "SciPy expm", "exact over a step", _prepare_expm(problem)))
     for tolerance in TOLERANCES:
         setting = f"rtol {tolerance:g}"
         for method in _METHODS:
@@ -59,6 +61,15 @@ def _prepare_core(problem: Problem) -> Callable[[], FloatArray | None]:
     def run() -> FloatArray | None:
         done = simulate(elements, inputs, start, TIME, outputs)
         return np.array(list(done.columns.values())).T if done.status == "completed" else None
+
+    return run
+
+
+def _prepare_expm(problem: Problem) -> Callable[[], FloatArray | None]:
+    whole = problem.augment() * (TIME[1] - TIME[0])
+
+    def run() -> FloatArray | None:
+        return problem.march(expm(whole))
 
     return run
 
