@@ -45,7 +45,7 @@ def identify_logs(
 
     Raises the typed errors of each stage.
     """
-    from drivetwin.estimation.analysis.experiment_design import rank_experiments
+    from drivetwin.estimation.analysis.experiment_design import rank_for_weak
     from drivetwin.shifts.detect import refuse_without_shifts
     from drivetwin.validation.multi_log import Source, identify_together
 
@@ -67,7 +67,7 @@ def identify_logs(
     with show_step(f"identifying by the {how.method} method"):
         made = identify_together(sources, card, how.method)
     with show_step("comparing experiments"):
-        found = rank_experiments(made.found)
+        found = rank_for_weak(made.found)
     return Joined(tuple(read), replace(made, found=found))
 
 

@@ -97,10 +97,10 @@ def run_identification(log: Path, how: IdentifyOptions) -> Outcome:
         model = identify_validated(recording, card, shifts, how.method)
     found = model.result
     if found.method is Method.LIKELIHOOD:
-        from drivetwin.estimation.analysis.experiment_design import rank_experiments
+        from drivetwin.estimation.analysis.experiment_design import rank_for_weak
 
         with show_step("comparing experiments"):
-            found = rank_experiments(found)
+            found = rank_for_weak(found)
     return Outcome(recording, card, found, model.twin)
 
 

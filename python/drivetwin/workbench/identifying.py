@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.analysis.experiment_design import rank_experiments
+from drivetwin.estimation.analysis.experiment_design import rank_for_weak
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.report.bus_outcome import BusOutcome, identify_vehicle
@@ -77,7 +77,7 @@ def _run_method(task: Task, method: Method) -> Outcome | Refusal:
         with _STEPS[method].enter("identification"):
             made = identify_together(task.sources, task.card, method)
         with _STEPS[method].enter("experiments", "comparing experiments"):
-            return Outcome(method, made.twins, rank_experiments(made.found))
+            return Outcome(method, made.twins, rank_for_weak(made.found))
     except Exception as error:
         fault = to_fault(error)
         return Refusal(method, f"{fault.what} -> {fault.remedy}")

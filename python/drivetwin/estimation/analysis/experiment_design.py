@@ -285,6 +285,15 @@ def rank_experiments(found: Identification) -> Identification:
     return replace(found, evidence=replace(found.evidence, suggestions=compute_rankings(found)))
 
 
+def rank_for_weak(found: Identification) -> Identification:
+    """Rank experiments as `rank_experiments`, where a parameter is weak or not identifiable.
+
+    Else the ranking, a tenth of the time of an identification, waits until it is asked for.
+    """
+    weak = any(one.verdict in _OPEN for one in found.estimates.values())
+    return rank_experiments(found) if weak else found
+
+
 def _compute_relative_width(one: Estimate) -> float:
     """Compute the standard deviation over the value; for a delay, over what counts as
     identified."""
