@@ -29,8 +29,9 @@ class ParameterSpec:
     lower: float
     upper: float
     suffix: str = ""
-    """`gear`, `element` or `log` where one value exists for each, else empty. Of one log alone the
-    id is the stem itself; of several fitted together the number of the log, from 1, follows."""
+    """`gear`, `element`, `channel` or `log` where one value exists for each, else empty. Of one log
+    alone the id is the stem itself; of several fitted together the number of the log, from 1,
+    follows."""
     weak_above: float = 0.25
 
 
@@ -155,6 +156,40 @@ _SPECS = (
 
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
 
+_BUS = (
+    ParameterSpec(
+        "k_over_J", "Stiffness over inertia", "k/J", "1/s^2",
+        "k·(1/J_a + 1/J_b) = σ² + ω² of the two sides of the driveline", 0.0, 1e6, "gear",
+    ),
+    ParameterSpec(
+        "speed_delay", "Delay behind the input speed", "τ", "s",
+        "time by which the bus shows a speed later than the input speed", -1.0, 1.0, "channel",
+    ),
+    ParameterSpec(
+        "torque_delay", "Dead time of the torque message", "d", "s",
+        "time by which the bus shows the engine torque later than it acts", -1.0, 1.0,
+    ),
+    ParameterSpec(
+        "J_engine", "Engine inertia, clutch open", "J_e", "kg*m^2",
+        "inertia of the engine side with the clutch open", 0.0, 1e3,
+    ),
+    ParameterSpec(
+        "J_total", "Total inertia over η", "J/η", "kg*m^2",
+        "J_v/η + i²·J_e at the gearbox output, in a gear", 0.0, 1e9, "gear",
+    ),
+    ParameterSpec(
+        "J_vehicle_out", "Vehicle inertia over η", "J_v/η", "kg*m^2",
+        "inertia of the vehicle at the gearbox output over the efficiency", 0.0, 1e9,
+    ),
+    ParameterSpec(
+        "mass_over_eta", "Vehicle mass over η", "m/η", "kg",
+        "mass of the vehicle over the efficiency, by final drive and wheel radius", 0.0, 1e9,
+    ),
+)  # fmt: skip
+
+BUS_SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _BUS}
+"""Quantities of bus logs alone."""
+
 
 FINAL_DRIVE = "i_f"
 """Id of the final drive."""
@@ -194,13 +229,14 @@ def get_parameter_spec(parameter_id: str) -> ParameterSpec:
 
     Raises InputError for an id that no declaration covers.
     """
+    exact = SPECS.get(parameter_id) or BUS_SPECS.get(parameter_id)
+    if exact is not None:
+        return exact
     if parameter_id.endswith(OVER_ETA):
         whole = get_parameter_spec(parameter_id.removesuffix(OVER_ETA))
         return replace(whole, symbol=f"{whole.symbol}/η", meaning=f"{whole.meaning}, over η")
-    if parameter_id in SPECS:
-        return SPECS[parameter_id]
-    for spec in _SPECS:
-        separator = {"gear": "_", "element": ".", "log": "."}.get(spec.suffix)
+    for spec in (*_SPECS, *_BUS):
+        separator = {"gear": "_", "element": ".", "channel": ".", "log": "."}.get(spec.suffix)
         if separator and parameter_id.startswith(spec.stem + separator):
             return spec
     raise InputError(

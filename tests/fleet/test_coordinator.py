@@ -50,7 +50,7 @@ def test_a_changed_setting_is_a_new_row_and_the_old_one_stays(tmp_path: Path) ->
     found = contents(store)
     assert len(found["logs"]) == 6
     assert len({row["settings"] for row in found["logs"]}) == 2
-    (logs / "card.toml").write_text("gears = 2\n")
+    (logs / "card.toml").write_text("gears = 2\nelements = 1\n")
     assert run_toys(logs, store)[0].computed == 3
     current = {row["log"] for row in found["files"]}
     assert len(contents(store)["logs"]) == 9

@@ -20,7 +20,7 @@ def folder(tmp_path: Path) -> Path:
     """Two logs and a card."""
     for name in ("a.csv", "b.csv"):
         (tmp_path / name).write_text(f"time,x\ns,bar\n0,1\n1,{name!r}\n")
-    (tmp_path / "card.toml").write_text("gears = 1")
+    (tmp_path / "card.toml").write_text("gears = 1\nelements = 1")
     return tmp_path
 
 
@@ -37,7 +37,7 @@ def test_keys_follow_from_content_and_settings_not_from_paths(folder: Path) -> N
     (folder / "b.csv").write_bytes((folder / "a.csv").read_bytes())
     again = _scan(folder)
     assert {one.file.log for one in again} == {first[0].file.log}
-    (folder / "card.toml").write_text("gears = 2")
+    (folder / "card.toml").write_text("gears = 2\nelements = 1")
     assert _scan(folder)[0].file.log != first[0].file.log
 
 

@@ -28,7 +28,7 @@ LIMITS = Limits(seconds=30.0, memory=200 * 2**20)
 def make_logs(folder: Path, count: int, *, word: str = "", spoilt: Sequence[str] = ()) -> Path:
     """`count` files that all say `word`, the first ones a word of `spoilt` too; `card.toml`."""
     folder.mkdir()
-    (folder / "card.toml").write_text("gears = 1\n")
+    (folder / "card.toml").write_text("gears = 1\nelements = 1\n")
     for number in range(count):
         extra = spoilt[number] if number < len(spoilt) else ""
         unit = folder / f"unit_{number % 3}"

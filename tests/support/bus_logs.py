@@ -11,14 +11,16 @@ BUS_LOGS, RATIOS = ("run0.csv", "run1.csv", "run2.csv"), "ratios.toml"
 RPM = 30.0 / np.pi
 
 
-def write_log(path: Path, seed: int, *, output_torque: bool = False) -> Path:
-    """A shift from ratio 2.6 to 1.9 with a decay of 3 Hz, in messages of 10 ms."""
+def write_log(
+    path: Path, seed: int, *, output_torque: bool = False, frequency: float = 3.0
+) -> Path:
+    """A shift from ratio 2.6 to 1.9 with a decay of `frequency` [Hz], in messages of 10 ms."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 5.0, 0.01)
     output = 70.0 + 1.5 * time
     ratio = np.interp(time, [1.0, 1.4], [2.6, 1.9])
     later = np.maximum(time - 1.4, 0.0)
-    swing = 2.0 * np.exp(-1.5 * later) * np.sin(2.0 * np.pi * 3.0 * later)
+    swing = 2.0 * np.exp(-1.5 * later) * np.sin(2.0 * np.pi * frequency * later)
     inlet = ratio * output + swing
     columns = {
         "time [s]": time,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from pathlib import Path
 from time import monotonic
@@ -27,6 +27,7 @@ from drivetwin.fleet.task import (
     Aborted,
     Completed,
     Limits,
+    Member,
     Outcome,
     Reply,
     State,
@@ -146,18 +147,20 @@ class Coordinator:
             assert one.fault is not None
             self._record_outcome(file.log, [file], Completed(one.fault, 0.0), computed=False)
             return None
-        task = self._build_task(file, one.recipe)
+        task = self._build_task(file, one.recipe, one.members)
         if self._reuse_outcome(task, file):
             return None
         self._out[file.log] = [file]
         return task
 
-    def _build_task(self, file: FileRow, recipe: TaskSpec) -> Task:
+    def _build_task(self, file: FileRow, recipe: TaskSpec, members: Sequence[Member]) -> Task:
         store, log = self._store, file.log
+        has_traces = self._options.traces and not members  # bus logs have no simulation
         return Task(
             log, file.path, file.content, recipe, str(store.get_part_path(log)),
             report=str(store.get_report_path(log)) if self._options.reports else None,
-            traces=str(store.get_traces_path(log)) if self._options.traces else None,
+            traces=str(store.get_traces_path(log)) if has_traces else None,
+            members=tuple(members),
         )  # fmt: skip
 
     def _reuse_outcome(self, task: Task, file: FileRow) -> bool:

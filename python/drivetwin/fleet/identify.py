@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One log of a fleet: what `drivetwin identify` does, down to the rows of the store.
+"""One log of a fleet, or the bus logs of one vehicle: `drivetwin identify` down to the rows.
 
 A design prior pulls the estimate of every log in the same direction: averaged over a fleet it would
 count once for each log and hide ageing. It is therefore removed from friction and fill pressure.
@@ -22,11 +22,12 @@ from drivetwin.errors import FileFormatError, InputError, MissingChannelError, S
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.linear.friction_points import P0, evaluate_stribeck
-from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.estimation.result.prior_conflict import remove_prior
 from drivetwin.estimation.result.verdict import assess, reject_identified
+from drivetwin.fleet.members import identify_members
 from drivetwin.fleet.parts import convert_write_errors
-from drivetwin.fleet.rows import MU, Found, Row, RowKind
+from drivetwin.fleet.rows import MU, Found, Row, RowKind, make_estimate_row
 from drivetwin.fleet.scan import compute_input_hashes
 from drivetwin.fleet.task import ShiftRow, Task, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
@@ -109,8 +110,13 @@ def identify_log(task: Task) -> Found:
     """
     recipe = task.recipe
     _check_inputs(recipe)  # before, for what is broken by now is not the log's fault
-    card = _load_card(recipe)
     mapping = None if recipe.channels is None else Path(recipe.channels)
+    if task.members:
+        found_together = identify_members(task, mapping)
+        _check_inputs(recipe)
+        means = [*_average_means(task, mapping), *found_together.rows]
+        return replace(found_together, rows=means)
+    card = _load_card(recipe)
     log = read_log(Path(task.path), card, mapping)
     _check_inputs(recipe)
     if log.sha256 != task.content:
@@ -190,6 +196,20 @@ def _compute_channel_means(task: Task, mapping: Path | None) -> Iterator[Row]:
             yield Row(RowKind.FIELD, field, float(np.mean(known)), si_unit=unit)
 
 
+def _average_means(task: Task, mapping: Path | None) -> Iterator[Row]:
+    """Average the means of channels over the bus logs of a vehicle; repeat all other rows."""
+    means: dict[str, list[Row]] = {}
+    for path, _ in task.members:
+        for row in _compute_channel_means(replace(task, path=path), mapping):
+            if row.kind is RowKind.FIELD:
+                means.setdefault(row.name, []).append(row)
+            else:
+                yield row
+    for rows in means.values():
+        mean = float(np.mean([row.value for row in rows if row.value is not None]))
+        yield replace(rows[0], value=mean)
+
+
 def make_shift_rows(found: FoundShifts) -> list[ShiftRow]:
     """Used shifts, then refused ones."""
     used = [
@@ -231,7 +251,7 @@ def make_result_rows(found: Identification, card: VehicleCard, mu_slip: float) -
 
 def _make_parameter_rows(found: Identification, card: VehicleCard, slip: float) -> list[Row]:
     """All estimates, with μ at one slip of every element whose curve reaches it."""
-    rows = {one.id: _make_estimate_row(one) for one in found.estimates.values()}
+    rows = {one.id: make_estimate_row(one) for one in found.estimates.values()}
     own = {name: curve for name, curve in found.friction.items() if not curve.is_borrowed}
     for element, curve in own.items():
         mu, fill = MU + element, f"P0.{element}"
@@ -243,14 +263,6 @@ def _make_parameter_rows(found: Identification, card: VehicleCard, slip: float) 
         if free is not None and fill in rows:
             rows[fill] = replace(rows[fill], free_value=free.P0, free_std=free.P0_std)
     return list(rows.values())
-
-
-def _make_estimate_row(one: Estimate) -> Row:
-    low, high = one.ci95_total or (None, None)
-    return Row(
-        RowKind.PARAMETER, one.id, one.value, one.std_noise, one.std_total, low, high,
-        one.unit, one.verdict.value, one.method, one.reason,
-    )  # fmt: skip
 
 
 def _make_mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
@@ -273,7 +285,7 @@ def _make_mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
     one = assess(name, mu, std, curve.method_text)
     if curve.verdict is not Verdict.IDENTIFIED:
         one = reject_identified(one, curve.reason)
-    return replace(_make_estimate_row(one), std_noise=None, at=slip)
+    return replace(make_estimate_row(one), std_noise=None, at=slip)
 
 
 def _make_friction_rows(element: str, curve: FrictionCurve) -> Iterator[Row]:

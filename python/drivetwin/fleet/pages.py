@@ -11,6 +11,7 @@ import numpy as np
 from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
+from drivetwin.report.bus_outcome import BusOutcome
 from drivetwin.report.html import render_report, save_library
 
 LIBRARY = "plotly.js"
@@ -18,10 +19,19 @@ LIBRARY = "plotly.js"
 
 def save_single(path: Path, found: Identification, log: ShiftLog) -> None:
     """Write the report of one log; all reports of a fleet use one library file."""
+    _save_page(path, render_report(found, log, LIBRARY))
+
+
+def save_vehicle(path: Path, outcome: BusOutcome) -> None:
+    """Write the report of the bus logs of one vehicle."""
+    _save_page(path, outcome.render(LIBRARY))
+
+
+def _save_page(path: Path, text: str) -> None:
     library = path.with_name(LIBRARY)
     if not library.is_file():
         save_library(library)
-    write_text(path, render_report(found, log, LIBRARY))
+    write_text(path, text)
 
 
 def save_traces(path: Path, found: Identification) -> None:

@@ -14,7 +14,8 @@ import numpy as np
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
-from drivetwin.estimation.result.estimate import Z95
+from drivetwin.bus.quantities import METHOD as BUS_METHOD
+from drivetwin.estimation.result.estimate import Z95, Verdict
 from drivetwin.fleet.figures import format_unit, plot_drift, plot_units
 from drivetwin.fleet.friction import compute_fleet_friction
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
@@ -23,6 +24,7 @@ from drivetwin.fleet.mixed_model.reasons import collect_output_fits
 from drivetwin.fleet.mixed_model.result import Interval, JointEstimate, Outlier
 from drivetwin.fleet.pages import LIBRARY
 from drivetwin.fleet.quality import collect_unit_figures, compare_units, merge_figures
+from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.rules import format_reading, format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import State
@@ -46,7 +48,7 @@ from drivetwin.report.blocks import (
 from drivetwin.report.figures.friction import plot_friction
 from drivetwin.report.html import render_page
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.parameters import make_parameter_cell
+from drivetwin.report.sections.parameters import TONES, make_parameter_cell
 from drivetwin.report.whole_drive import build_comparison_table, get_figure_label
 from drivetwin.shifts.quality import QUALITY_UNITS
 
@@ -72,6 +74,7 @@ def render_fleet(
     """Return the HTML text of the page; links are relative to `folder`."""
     sections = [
         _build_overview(store),
+        build_vehicle_section(store, folder),
         _build_parameters_section(found, list_missing_estimates(store, found)),
         _build_outlier_section(store, found, folder),
         build_ageing_section(found),
@@ -160,6 +163,33 @@ def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[
         "errors that a unit keeps are part of the spread: logs alone do not separate them.",
         blocks,
     )
+
+
+def build_vehicle_section(store: Store, folder: Path) -> Section:
+    """Build the values of each vehicle of bus logs; `folder` is the folder of the page."""
+    import pyarrow.compute as pc
+
+    rows = store.read_rows(RowKind.PARAMETER)
+    rows = rows.filter(pc.equal(rows.column("method"), BUS_METHOD)).to_pylist()
+    known = collect_facts(store)
+    order = {name: k for k, name in enumerate(dict.fromkeys(row["name"] for row in rows))}
+    rows = [row for row in rows if row["log"] in known and row["value"] is not None]
+    rows.sort(key=lambda row: (order[row["name"]], known[row["log"]][1].unit))
+    cells = []
+    for row in rows[:MOST_ROWS]:
+        display = get_display_unit(row["si_unit"])
+        half = Z95 * row["std_total"] * display.factor
+        value, half_text = format_uncertainty(row["value"] * display.factor, half)
+        verdict = make_badge(row["verdict"], TONES[Verdict(row["verdict"])])
+        unit = known[row["log"]][1].unit
+        vehicle = Cell(unit, href=make_report_link(store, row["log"], folder))
+        name = make_parameter_cell(row["name"])
+        cells.append((name, vehicle, value, half_text, display.label, verdict))
+    columns = ("parameter", "vehicle", ("value", "s"), ("± 95 %", "s"), "unit", "verdict")
+    caption = f"Each vehicle from all its logs{make_truncation_caption(len(rows))}."
+    blocks: list[Block] = [make_table(caption, columns, cells)] if cells else []
+    intro = "Bus logs of one vehicle are identified together and have one result."
+    return Section("vehicles", "Vehicles of bus logs", intro, blocks)
 
 
 def _has_several_rules(found: Sequence[JointEstimate]) -> bool:

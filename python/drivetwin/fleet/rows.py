@@ -9,6 +9,7 @@ from enum import StrEnum
 from functools import cache
 from typing import Any
 
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.fleet.task import ShiftRow
 
 MU = "mu."
@@ -55,6 +56,15 @@ class Row:
     at: float | None = None
     free_value: float | None = None
     free_std: float | None = None
+
+
+def make_estimate_row(one: Estimate) -> Row:
+    """Return the row of an estimate."""
+    low, high = one.ci95_total or (None, None)
+    return Row(
+        RowKind.PARAMETER, one.id, one.value, one.std_noise, one.std_total, low, high,
+        one.unit, one.verdict.value, one.method, one.reason,
+    )  # fmt: skip
 
 
 ROW_COLUMNS = ("log", *(field.name for field in fields(Row)))

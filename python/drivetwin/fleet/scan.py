@@ -8,9 +8,9 @@ import json
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from time import monotonic
@@ -22,9 +22,10 @@ from drivetwin.errors import DrivetwinError, FileFormatError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.rules import RulesFile, select_rule
-from drivetwin.fleet.sources import Source, Sources
-from drivetwin.fleet.task import Outcome, State, TaskSpec
+from drivetwin.fleet.sources import Source, Sources, name_members
+from drivetwin.fleet.task import Member, Outcome, State, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
+from drivetwin.vehicle.ratio_card import is_ratio_card
 
 ROWS_FORMAT = 2
 """Counts up when the same identification leaves other rows."""
@@ -39,12 +40,16 @@ _KEY = 40
 
 @dataclass(frozen=True)
 class Scanned:
-    """A scanned file. `recipe` is None if it cannot be used; `fault` then holds the reason."""
+    """A scanned file. `recipe` is None if it cannot be used; `fault` then holds the reason.
+
+    `members` are the bus logs of the file's vehicle, each content once; all have the same `log`.
+    """
 
     file: FileRow
     settings: str
     recipe: TaskSpec | None
     fault: Outcome | None = None
+    members: tuple[Member, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,13 +82,25 @@ class Scan:
         self._stop = threading.Event()
         self._method = method
         self._recipe = lru_cache(self._read_recipe)
+        self._is_bus = lru_cache(is_ratio_card)
 
     def scan_files(self, sources: Sources, known: Known) -> Generator[Scanned | Skipped]:
-        """Every file of `sources` in their order, read a little ahead.
+        """Every file of `sources` in their order, read a little ahead; then bus logs by vehicle.
 
         `known` finds what is known of a path: a file of the same size and time of change is not
-        read again.
+        read again. Bus logs are those that a rule reads with a card of the ratios alone.
         """
+        vehicles: dict[tuple[str, str, str], list[Scanned]] = {}
+        for one in self._scan_each(sources, known):
+            if isinstance(one, Scanned) and one.members:
+                key = one.file.rule, one.file.unit, one.settings
+                vehicles.setdefault(key, []).append(one)
+            else:
+                yield one
+        for logs in vehicles.values():
+            yield from _join_vehicle(logs)
+
+    def _scan_each(self, sources: Sources, known: Known) -> Generator[Scanned | Skipped]:
         waiting: deque[tuple[Source, Future[_Content]]] = deque()
         self._stop.clear()
         readers = ThreadPoolExecutor(_READERS)
@@ -110,6 +127,7 @@ class Scan:
             if rule.vehicle is None:
                 return Skipped(path)
             recipe = self._recipe(rule.vehicle, rule.channels)
+            is_bus = self._is_bus(Path(rule.vehicle))
         except (OSError, DrivetwinError) as fault:
             error = _make_read_error(fault, path) if isinstance(fault, OSError) else fault
             return _make_refusal(path, unit, content, error)
@@ -118,7 +136,8 @@ class Scan:
         file = FileRow(
             path, log, content.digest, content.size, content.modified, rule.name, unit, fields
         )
-        return Scanned(file, settings, recipe)
+        members = ((path, content.digest),) if is_bus else ()
+        return Scanned(file, settings, recipe, members=members)
 
     def _read_content(self, path: Path, known: FileRow | None) -> _Content:
         """Read content and state of a file, unless it is `known` and did not change.
@@ -168,6 +187,18 @@ class Scan:
             means=self._rules.list_channel_means(),
             mu_slip=self._rules.mu_slip_rad_s,
         )
+
+
+def _join_vehicle(logs: Sequence[Scanned]) -> Iterator[Scanned]:
+    """Give the bus logs of a vehicle one key, which follows from names, contents and settings."""
+    files: dict[str, Member] = {}
+    for one in sorted(logs, key=lambda log: log.file.path):
+        files.setdefault(one.file.content, (one.file.path, one.file.content))
+    names = name_members([path for path, _ in files.values()])
+    parts = (f"{name} {content}" for name, content in zip(names, files, strict=True))
+    log = _compute_key("vehicle", logs[0].settings, *sorted(parts))
+    for one in logs:
+        yield replace(one, file=replace(one.file, log=log), members=tuple(files.values()))
 
 
 def compute_input_hashes(vehicle: str, channels: str | None) -> tuple[tuple[str, str], ...]:

@@ -8,7 +8,7 @@ import glob
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from drivetwin._util.csv_text import parse_csv_row, restore_cell
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
@@ -111,3 +111,12 @@ def _read_list(path: Path) -> Iterator[Source]:
             "give a CSV table with a column 'path', or one path a line, in UTF-8",
             Where(file=str(path)),
         ) from None
+
+
+def name_members(paths: Sequence[str]) -> list[str]:
+    """Return a different name for each file: the end of its path, as long as needed."""
+    parts = [PurePath(one).parts for one in paths]
+    size = 1
+    while len({one[-size:] for one in parts}) < len(parts):
+        size += 1
+    return [" ".join(one[-size:]) for one in parts]

@@ -46,9 +46,16 @@ class TaskSpec:
     mu_slip: float = 50.0
 
 
+Member = tuple[str, str]
+"""Path and SHA-256 of a log of a vehicle."""
+
+
 @dataclass(frozen=True)
 class Task:
     """One log to identify. `log` is the key of its rows, `content` the SHA-256 of the file.
+
+    `members` are path and SHA-256 of all bus logs of one vehicle, which are identified together;
+    empty for a log that is identified alone. The first one is at `path`.
 
     `part` is the Parquet file to write, `report` the HTML page and `traces` the Parquet file of
     simulation over measurement that are wanted besides; all absolute paths.
@@ -61,6 +68,7 @@ class Task:
     part: str
     report: str | None = None
     traces: str | None = None
+    members: tuple[Member, ...] = ()
 
     def to_json(self) -> str:
         """One line of JSON."""
@@ -72,7 +80,9 @@ class Task:
         tree = json.loads(text)
         recipe = tree["recipe"]
         recipe |= {name: tuple(map(tuple, recipe[name])) for name in ("inputs", "means")}
-        return cls(**{**tree, "recipe": TaskSpec(**{**recipe, "method": Method(recipe["method"])})})
+        recipe |= {"method": Method(recipe["method"])}
+        members = tuple(map(tuple, tree["members"]))
+        return cls(**{**tree, "recipe": TaskSpec(**recipe), "members": members})
 
 
 @dataclass(frozen=True)

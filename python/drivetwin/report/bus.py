@@ -36,12 +36,15 @@ _SHOWN = 8
 
 
 def render_bus(
-    found: BusIdentification, logs: Sequence[str], remarks: Sequence[Finding] = ()
+    found: BusIdentification,
+    logs: Sequence[str],
+    remarks: Sequence[Finding] = (),
+    library: str | None = None,
 ) -> str:
-    """HTML text of the page; equal results give equal text."""
+    """HTML text of the page, with plotly.js inside or in the file `library`."""
     title = f"Bus logs: {', '.join(logs)}"
     subtitle = f"{len(logs)} logs · {len(found.shifts)} shifts"
-    return render_page(title, subtitle, build_bus_sections(found, remarks))
+    return render_page(title, subtitle, build_bus_sections(found, remarks), library)
 
 
 def build_bus_sections(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Section]:

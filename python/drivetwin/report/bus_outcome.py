@@ -37,9 +37,9 @@ class BusOutcome:
         """Build the sections of the report and of the workbench."""
         return build_bus_sections(self.found, self.remarks)
 
-    def render(self) -> str:
-        """Render the report as HTML."""
-        return render_bus(self.found, self.logs, self.remarks)
+    def render(self, library: str | None = None) -> str:
+        """Render the report as HTML, with plotly.js inside or in the file `library`."""
+        return render_bus(self.found, self.logs, self.remarks, library)
 
 
 def identify_vehicle(

@@ -101,3 +101,17 @@ def test_another_unit_of_measure_changes_nothing(scale: float, shift: float) -> 
     found = fit_mixed_model(moved, intervals=False)
     assert found.beta[0] / scale - shift == pytest.approx(base.beta[0], abs=1e-5)
     assert found.sigma / scale == pytest.approx(base.sigma, rel=2e-2, abs=1e-5)
+
+
+def test_one_log_of_each_unit_counts_as_it_states() -> None:
+    inside, spreads = 0, []
+    for seed in range(COARSE):
+        draws = np.random.default_rng(2000 + seed)
+        ones = np.ones((12, 1))
+        y = LEVEL + draws.normal(0.0, np.hypot(SPREAD, 1e-3), 12)
+        fit = fit_mixed_model(Observations(y, np.full(12, 1e-3), np.arange(12), ones, ones))
+        assert fit.excess == pytest.approx(1.0)
+        inside += fit.sigma_ci[0, 0] <= SPREAD <= fit.sigma_ci[0, 1]
+        spreads.append(fit.sigma[0])
+    assert_covers(inside, COARSE)
+    assert np.mean(spreads) == pytest.approx(SPREAD, rel=0.1)

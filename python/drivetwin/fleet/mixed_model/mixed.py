@@ -4,7 +4,8 @@
     y_ij = x_ij·β + z_ij·b_i + e_ij,   b_i ~ N(0, diag(σ²)),   e_ij ~ N(0, d_ij)
 
 i counts units, j the logs of one. d is the variance that a log states of itself, all scaled down
-if the logs scatter less than they state, with a common variance added if they scatter more.
+if the logs scatter less than they state, with a common variance added if they scatter more. With
+one log of each unit this is not separable from σ, and d is the variance as stated.
 Restricted likelihood after Harville, J. Am. Stat. Assoc. 72 (1977) 320; intervals of σ from its
 profile. Per unit only q × q matrices occur (Woodbury), so that the cost is linear in the logs.
 """
@@ -99,6 +100,9 @@ class _Likelihood:
         self.square = seen.std**2
         self.typical = float(np.median(self.square))
         self.weighted = lru_cache(8)(self._apply_weights)
+        single = seen.z.shape[1] > 0 and seen.units == seen.y.size
+        spreads = seen.z.shape[1] * [(np.log(_SMALLEST), np.log(_LARGEST))]
+        self.bounds = [(0.0, 0.0) if single else (-6.0, 12.0), *spreads]
 
     def compute_variance(self, w: float) -> FloatArray:
         """d (n,): the stated variances times e^w below w = 0, plus a common one above."""
@@ -186,10 +190,6 @@ def fit_mixed_model(seen: Observations, *, intervals: bool = True) -> MixedFit:
     )
 
 
-def _make_bounds(count: int) -> list[tuple[float, float]]:
-    return [(-6.0, 12.0)] + count * [(np.log(_SMALLEST), np.log(_LARGEST))]
-
-
 def _find_minimum(likelihood: _Likelihood) -> FloatArray:
     """The best of a few starts: little and much spread over units."""
     count = likelihood.seen.z.shape[1]
@@ -198,7 +198,7 @@ def _find_minimum(likelihood: _Likelihood) -> FloatArray:
             likelihood.compute_deviance,
             np.array([0.0, *[np.log(spread)] * count]),
             method="L-BFGS-B",
-            bounds=_make_bounds(count),
+            bounds=likelihood.bounds,
         )
         for spread in (0.1, 3.0)
     ]
@@ -210,7 +210,7 @@ def _find_profile_interval(
 ) -> tuple[float, float]:
     """Find where the profile deviance is 3.84 above its minimum: a 95 % interval of σ."""
     others = [k for k in range(best.size) if k != place]
-    bounds = [_make_bounds(best.size - 1)[k] for k in others]
+    bounds = [likelihood.bounds[k] for k in others]
     lowest = likelihood.compute_deviance(best)
 
     def above(log_sigma: float) -> float:
