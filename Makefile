@@ -82,7 +82,7 @@ test-statistical: ## coverage of intervals over many noise realisations
 test-crosscompile: ## libraries and FMUs for other platforms
 test-faults: ## killed workers and coordinators, a full disk, a lost scheduler (fault_logs=1000 logs each)
 test-exhaustive: ## thousands of damaged files through each reader
-test-howto: ## commands of the how-to pages that identify
+test-howto: ## commands of the how-to pages that identify, and of the tutorials
 fault_logs ?= 40
 test-faults: export FLEET_FAULT_LOGS := $(fault_logs)
 $(suites:%=test-%): test-%: $(venv)/.dev native

@@ -1,24 +1,39 @@
 # SPDX-License-Identifier: MIT
-"""Write the gallery: docs/gallery.md and docs/img/gallery-*.png.
+"""Write the gallery and the pictures of the tutorials.
 
 `python -m tools.gallery` runs the commands of each entry in an empty folder and draws the page that
-they write; needs Chromium on the PATH. `python -m tools.gallery NAME...` draws some entries.
+they write: docs/gallery.md and docs/img/gallery-*.png. It runs each tutorial in the same way, draws
+docs/img/tutorial-*.png and writes the notebook. Needs Chromium on the PATH.
+`python -m tools.gallery NAME...` draws some entries and tutorials.
 """
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import chdir
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from tools.picture import BROWSERS, OPTIONS, PICTURES
+from playwright.sync_api import sync_playwright
+
+from tools.picture import BROWSERS, PICTURES
+from tools.run_page import run_page
 
 PAGE = PICTURES.parent / "gallery.md"
-_SIZE = "--window-size=1200,1000"
+TUTORIALS = PICTURES.parent / "tutorial"
+NOTEBOOK = TUTORIALS / "notebook.ipynb"
+_WINDOW = (1200, 1000)
+_TUTORIAL_WINDOW = (1000, 760)
+_SETTLED = 2000
+"""Time until a page has drawn its figures [ms]."""
 
 
 @dataclass(frozen=True)
@@ -151,29 +166,100 @@ def write_page() -> str:
     return "\n".join(parts)
 
 
-def draw_entry(browser: str, entry: Entry) -> Path:
+@dataclass(frozen=True)
+class Shot:
+    """A part of a page to draw.
+
+    The file, the selector of an element or "" for the window, and the greatest height [px].
+    """
+
+    page: str
+    place: str = ""
+    height: int = 1000
+
+
+SHOTS: Mapping[str, Mapping[str, Shot]] = {
+    "bench-log": {
+        "bench-simulation": Shot("out/report.html", "#validation figure", 620),
+        "bench-parameters": Shot("out/report.html", "#result table"),
+        "bench-friction": Shot("out/report.html", "#friction figure"),
+        "bench-calibration": Shot("calibration/report.html", "#profiles figure"),
+    },
+    "bus-log": {
+        "bus-decays": Shot("bus/report.html", "#decays figure"),
+        "bus-prediction": Shot("bus/report.html", "#predictions figure"),
+    },
+    "notebook": {
+        "notebook-log": Shot("log.html"),
+        "notebook-simulation": Shot("simulation.html"),
+        "notebook-softer": Shot("softer.html"),
+    },
+}
+"""Pictures of each tutorial: name after `tutorial-`, and its source in the folder of the run."""
+
+
+def draw_shots(browser: str, shots: Mapping[Path, Shot], window: tuple[int, int]) -> None:
+    """Save each shot, whose page is a path from the current folder, as the picture of its key."""
+    width, height = window
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        page = opened.new_page(viewport={"width": width, "height": height})
+        for picture, shot in shots.items():
+            page.goto(Path(shot.page).resolve().as_uri())
+            page.wait_for_timeout(_SETTLED)
+            box = page.locator(shot.place or "body").first.bounding_box()
+            frame = (
+                box if shot.place and box else {"x": 0, "y": 0, "width": width, "height": height}
+            )
+            frame["height"] = min(frame["height"], shot.height)
+            page.screenshot(path=picture, clip=frame, full_page=True)
+            print(f"wrote {picture} ({picture.stat().st_size / 1e3:.0f} kB)", flush=True)
+        opened.close()
+
+
+def draw_entry(browser: str, entry: Entry) -> None:
     """Run the commands of an entry and draw its page.
 
     Raises
     ------
     CalledProcessError
-        A command or the browser fails.
+        A command fails.
     """
-    picture = PICTURES / f"gallery-{entry.name}.png"
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for command in entry.commands:
-            _, *arguments = shlex.split(command)
-            for argument in arguments:
-                if argument.startswith("logs/"):
-                    (folder / argument).parent.mkdir(parents=True, exist_ok=True)
-            program = [sys.executable, "-m", "drivetwin", *arguments]
-            subprocess.run(program, check=True, capture_output=True, cwd=folder)
-        profile = f"--user-data-dir={folder / 'profile'}"
-        address = (folder / entry.page).as_uri()
-        options = [*OPTIONS, _SIZE, profile, f"--screenshot={picture}"]
-        subprocess.run([browser, *options, address], check=True, capture_output=True)
-    return picture
+    for command in entry.commands:
+        _, *arguments = shlex.split(command)
+        for argument in arguments:
+            if argument.startswith("logs/"):
+                Path(argument).parent.mkdir(parents=True, exist_ok=True)
+        program = [sys.executable, "-m", "drivetwin", *arguments]
+        subprocess.run(program, check=True, capture_output=True)
+    draw_shots(browser, {PICTURES / f"gallery-{entry.name}.png": Shot(entry.page)}, _WINDOW)
+
+
+def draw_tutorial(browser: str, name: str) -> None:
+    """Run a tutorial and draw its pictures."""
+    run_page(TUTORIALS / f"{name}.md")
+    shots = {PICTURES / f"tutorial-{one}.png": shot for one, shot in SHOTS[name].items()}
+    draw_shots(browser, shots, _TUTORIAL_WINDOW)
+
+
+def write_notebook(page: str) -> str:
+    """Return the text and the code of a tutorial as a notebook without outputs."""
+    cells: list[dict[str, Any]] = [
+        {"cell_type": kind, "id": f"cell-{number}", "metadata": {}, "source": source}
+        | ({"execution_count": None, "outputs": []} if kind == "code" else {})
+        for number, (kind, source) in enumerate(_split_cells(page))
+    ]
+    metadata = {"language_info": {"name": "python"}}
+    notebook = {"cells": cells, "metadata": metadata, "nbformat": 4, "nbformat_minor": 5}
+    return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
+
+
+def _split_cells(page: str) -> Iterator[tuple[str, str]]:
+    """Split a page into text and code; printed text and pictures follow from the code."""
+    page = re.sub(r"^```text\n.*?^```\n+|^!\[[^\n]*\n+", "", page, flags=re.M | re.S)
+    for number, part in enumerate(re.split(r"^```python\n(.*?)^```$", page, flags=re.M | re.S)):
+        if part.strip():
+            yield ("code" if number % 2 else "markdown"), part.strip()
 
 
 def main(names: list[str]) -> int:
@@ -184,10 +270,16 @@ def main(names: list[str]) -> int:
         return 1
     for entry in ENTRIES:
         if not names or entry.name in names:
-            picture = draw_entry(browser, entry)
-            print(f"wrote {picture} ({picture.stat().st_size / 1e3:.0f} kB)", flush=True)
+            with tempfile.TemporaryDirectory() as folder, chdir(folder):
+                draw_entry(browser, entry)
+    for tutorial in SHOTS:
+        if not names or tutorial in names:
+            with tempfile.TemporaryDirectory() as folder, chdir(folder):
+                draw_tutorial(browser, tutorial)
     PAGE.write_text(write_page(), encoding="utf-8")
-    print(f"wrote {PAGE}")
+    source = (TUTORIALS / "notebook.md").read_text(encoding="utf-8")
+    NOTEBOOK.write_text(write_notebook(source), encoding="utf-8")
+    print(f"wrote {PAGE} and {NOTEBOOK}")
     return 0
 
 

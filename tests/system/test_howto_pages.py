@@ -1,29 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Commands and code of how-to pages run as printed, from an empty folder and in their order."""
+"""Commands and code of how-to pages and tutorials run as printed, from an empty folder."""
 
 from __future__ import annotations
 
 import importlib
 import re
-import shlex
-import shutil
 from pathlib import Path
 
 import pytest
 
 from drivetwin.authoring.sensor_classes import read_sensor_classes
-from drivetwin.cli import main
 from drivetwin.vehicle.card import load_card
+from tools.run_page import BLOCK, DOCS, find_outdated, run_line, run_page
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 HOWTO = DOCS / "howto"
-BLOCK = re.compile(
-    r"^(?: {4,}drivetwin (?P<line>[^\n]*)|```python\n(?P<code>.*?)^```)$", re.M | re.S
-)
-ELSEWHERE = re.compile(r"^app$|/data/|dask_jobqueue")
-"""Servers and clusters, which other tests start."""
-REFUSED = {"reduce three-set-3000 --shift 2-5": 2}
-"""Exit codes of commands whose refusal a page shows."""
+TUTORIALS = sorted((DOCS / "tutorial").glob("*.md"))
 SHIFT = ("synth -o shift.csv", "copy shift.card.toml truck.toml")
 OUT = (*SHIFT, "identify shift.csv --vehicle truck.toml -o out")
 RUNS = tuple(f"synth --seed {seed} -o run{seed}.csv" for seed in (1, 2, 3))
@@ -60,33 +51,10 @@ HOURS = ("calibrate.md", "own-controller.md")
 """Pages whose commands search for an hour; `tests/calibration` runs shorter ones."""
 
 
-def run_line(line: str) -> None:
-    """Run a command of the program, or `copy FROM TO`."""
-    words = shlex.split(line)
-    if words[0] != "copy":
-        assert main(words) == REFUSED.get(line, 0), line
-    elif Path(words[1]).is_dir():
-        shutil.copytree(words[1], words[2])
-    else:
-        shutil.copy(words[1], words[2])
-
-
-def run_page(name: str) -> None:
-    """Run commands and code of a page in their order; the code shares its names."""
-    names: dict[str, object] = {"__name__": "__main__"}
-    for block in BLOCK.finditer((HOWTO / name).read_text(encoding="utf-8")):
-        if ELSEWHERE.search(block["line"] or block["code"]):
-            continue
-        if block["line"] is not None:
-            run_line(block["line"])
-        elif name not in FRAGMENTS:
-            exec(compile(block["code"], name, "exec"), names)
-
-
 @pytest.mark.parametrize("name", SHORT)
 def test_a_short_page_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    run_page(name)
+    run_page(HOWTO / name)
     if name == "make-a-card.md":
         assert load_card("truck.toml").sensors["output_torque"].gain > 0.0
         assert load_card("plain.toml").elements["C4"].gain.value == 0.03
@@ -99,7 +67,24 @@ def test_a_long_page_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)
     for line in LONG[name]:
         run_line(line)
-    run_page(name)
+    run_page(HOWTO / name, with_code=name not in FRAGMENTS)
+
+
+@pytest.mark.howto
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[pytest.mark.short] if page.stem == "bus-log" else [])
+        for page in TUTORIALS
+    ],
+    ids=lambda page: page.stem,
+)
+def test_a_tutorial_prints_what_it_shows(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    printed = run_page(page)
+    assert find_outdated(page.read_text(encoding="utf-8"), printed) == []
 
 
 def test_every_page_is_run_or_named() -> None:
