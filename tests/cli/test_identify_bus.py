@@ -54,6 +54,27 @@ def test_without_a_card_the_ratios_are_those_of_the_speeds(
     assert "one shift" in found["parameters"]["f_d_2"]["reason"]
 
 
+def test_shifts_of_a_bus_log_have_the_phases_of_the_identification(
+    logs: list[Path], card: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = [str(logs[0]), "--vehicle", str(card)]
+    assert main(["shifts", *command]) == 0
+    assert "between gears" in capsys.readouterr().out
+    assert main(["shifts", *command, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["shifts"]
+    assert main(["identify", *command, "--json"]) == 0
+    assert found == json.loads(capsys.readouterr().out)["shifts"]
+    for more in (["--against", str(logs[1])], ["-o", str(tmp_path / "page.html")]):
+        assert main(["shifts", *command, *more]) == 2
+        assert "no figures of shift quality" in capsys.readouterr().err
+    path = tmp_path / "faulty.toml"
+    path.write_text('[[gears]]\nname = "1"\nratio = -2.0\n', encoding="utf-8")
+    assert main(["shifts", str(logs[0]), "--vehicle", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert "gears[0].ratio" in told
+    assert "elements" not in told
+
+
 def test_an_output_torque_needs_a_vehicle_card(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

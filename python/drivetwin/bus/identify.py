@@ -116,7 +116,7 @@ def identify_bus(
     made.findings += torques.findings
     for name in _BEYOND_METER:
         made.estimates[name] = refuse(name, "", explain(Code.BUS_NO_METER))
-    made.findings += [one for line in timelines for one in _find_limits(line)]
+    made.findings += [one for line in timelines for one in find_limits(line)]
     predictions: dict[str, DecayPrediction] = {}
     for line in (find_timeline(one, ratios, late) for one in others):
         for gear, each in _collect_decays([line], dead).items():
@@ -132,6 +132,13 @@ def identify_bus(
         torques.energies,
         tuple(made.findings),
     )
+
+
+def find_shifts(log: ShiftLog, card: RatioCard) -> Timeline:
+    """Find the gears held and the shifts of one bus log with their phases."""
+    bus, ratios = prepare_bus_log(log, Path(log.source).name), _get_values(card)
+    late, _ = _align([bus], ratios)
+    return find_timeline(bus, ratios, late)
 
 
 def _get_values(card: RatioCard) -> dict[str, float]:
@@ -213,8 +220,8 @@ def _collect_decays(
     return records
 
 
-def _find_limits(line: Timeline) -> Iterator[Finding]:
-    """Shifts of which the start or the end is not recorded."""
+def find_limits(line: Timeline) -> Iterator[Finding]:
+    """Yield a finding for each shift of which the start or the end is not recorded."""
     for shift in line.shifts:
         label = f"{line.log.label}, {shift.label}"
         if not shift.start_seen:

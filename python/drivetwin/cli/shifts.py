@@ -54,6 +54,8 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     For several shifts, state the distribution of each figure by kind and gears, outliers and trend.
     For a log without output torque, also estimate the resonance of the driveline after each shift,
     and the total inertia over η in each gear held, as far as the log determines them.
+
+    With a card of the ratios alone, list the shifts of a bus log and their phases.
     """
     from drivetwin.files.records import dump_findings
     from drivetwin.report.sections.summary import build_phase_table
@@ -62,7 +64,11 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     from drivetwin.shifts.shift import make_shift_labels
     from drivetwin.shifts.summary import compare_drives
     from drivetwin.vehicle.card import load_card
+    from drivetwin.vehicle.ratio_card import is_ratio_card
 
+    if is_ratio_card(request.vehicle):
+        _show_bus_shifts(request, as_json)
+        return
     card = load_card(request.vehicle)
     recording, found = _find_shifts(request, card, request.log)
     others = [
@@ -89,6 +95,17 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     print_findings(recording.findings)
     if request.output is not None and found.shifts:
         print_line(f"wrote {request.output}")
+
+
+def _show_bus_shifts(request: DetectShifts, as_json: bool) -> None:
+    """List the shifts of a bus log; raise InputError for options that need shift quality."""
+    from drivetwin.cli.shifts_bus import refuse_quality, show_bus_shifts
+
+    if request.against:
+        raise refuse_quality(request.vehicle, "--against")
+    if request.output is not None:
+        raise refuse_quality(request.vehicle, "--output")
+    show_bus_shifts(request.log, request.vehicle, request.channels, as_json=as_json)
 
 
 def _find_shifts(

@@ -102,7 +102,9 @@ def build_bus_file(
             name: ParameterRecord.from_result(one) for name, one in found.estimates.items()
         },
         shifts=[
-            _build_shift(line.log.label, shift) for line in found.timelines for shift in line.shifts
+            build_shift_record(line.log.label, shift)
+            for line in found.timelines
+            for shift in line.shifts
         ],
         decays={
             gear: BusDecayRecord(
@@ -126,7 +128,8 @@ def build_bus_file(
     )
 
 
-def _build_shift(log: str, shift: BusShift) -> BusShiftRecord:
+def build_shift_record(log: str, shift: BusShift) -> BusShiftRecord:
+    """Build the record of a shift of a log."""
     phases = [BusPhaseRecord(name=name.value, span=span) for name, span in shift.phases]
     return BusShiftRecord(
         log=log,
