@@ -28,7 +28,7 @@ myst_enable_extensions = ["dollarmath"]
 myst_fence_as_directive = {"math"}  # a code host draws these blocks too
 html_math_renderer = "mathml"
 html_static_path = ["static"]
-html_css_files = ["math.css"]
+html_css_files = ["site.css"]
 default_role = "code"
 smartquotes = False
 
