@@ -9,7 +9,7 @@ of a measured record: its rows lie on lines by chance, or it was computed of str
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ _PAUSE = 5.0
 """Time between rows that is a pause of the record, as for gaps of a channel [periods]."""
 _ROUNDS = 20
 """Steps of such a search [count]: cost of work."""
+_SCREENED = 2000
+"""Values or distances that are looked at before all others [count]: cost of work. A filling shows
+in any of them."""
 _LEAST_FILLED, _MOST_FILLED = 0.01, 0.9
 """Least ratio of interpolated rows to samples, and largest share of them where no sample is found:
 priors."""
@@ -55,13 +58,18 @@ def estimate_resolution(values: FloatArray) -> float:
     round_off = ROUND_OFF * largest
     if np.array_equal(values, values.astype(np.float32)):
         round_off = float(np.spacing(np.float32(largest)))
+    few = values[:: max(values.size // _SCREENED, 1)]
     for step in 10.0 ** -np.arange(0.0, 16.0):
         if step < round_off:
             break
-        scaled = values / step
-        if np.all(np.abs(scaled - np.round(scaled)) <= _WHOLE):
+        if _are_multiples(few, step) and _are_multiples(values, step):
             return max(float(step), estimate_rounding_step(values))
     return max(round_off, estimate_rounding_step(values))
+
+
+def _are_multiples(values: FloatArray, step: float) -> bool:
+    scaled = values / step
+    return bool(np.all(np.abs(scaled - np.round(scaled)) <= _WHOLE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,53 +218,71 @@ def _weigh_corners(
     count = last - first
     if count.size < _MIN_DISTANCES or count.max() == 1:
         return None
-    middle = np.concatenate((time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]))
-    apart = time[last] - time[first]
-    # Of a length without a scale each octave is as likely.
-    scaleless = 1.0 / (count * np.log(time.size))
+    distances = _Distances.build(time, first, last)
     # A raster has two unknowns more than a Markov chain.
-    against = _measure_chance(count, scaleless, seen.rounded) + float(np.log(count.size))
+    against = _measure_chance(count, distances.scaleless, seen.rounded) + float(np.log(count.size))
     if seen.rounded:
         against -= min(_weigh_signs(seen.bends[rows - 1], 2.0 * seen.step), 0.0)
     if against + PRIOR > 0.0:  # more than a raster that fits exactly can have
         return None
-    best = (-np.inf, 0.0)
-    cells = middle[last] - time[first], middle[last + 1] - time[first]
-    for rank in np.unique((np.array(_QUANTILES) * (count.size - 1)).astype(int)):
-        period = float(np.partition(apart, rank)[rank])
-        if abs(period - best[1]) > 1e-3 * period:
-            fit = _fit_raster(cells, apart, period, scaleless)
-            # If each row is a sample of the raster the record is not filled. Pauses do not count.
-            recorded = float(np.sum(np.minimum(np.diff(time), _PAUSE * fit[1])))
-            if fit[1] * (time.size - 1) > (1.0 + _LEAST_FILLED) * recorded:
-                best = max(best, fit)
-    if best[1] == 0.0:
+    # If each row is a sample of the raster the record is not filled. Pauses do not count.
+    steps = np.diff(time)
+
+    def is_filled(fit: tuple[float, float]) -> bool:
+        recorded = float(np.sum(np.minimum(steps, _PAUSE * fit[1])))
+        return fit[1] * steps.size > (1.0 + _LEAST_FILLED) * recorded
+
+    few = distances.thin(_SCREENED)
+    starts = np.unique(np.quantile(few.apart, _QUANTILES, method="lower"))
+    rough = [fit for one in starts if is_filled(fit := _fit_raster(few, float(one)))]
+    best = max(rough, default=(-np.inf, 0.0))
+    if best[0] < _measure_chance(few.count, few.scaleless, seen.rounded):
         return None
-    periods = np.maximum(np.round(apart / best[1]), 1.0)
-    return _Corners(rows, float(np.median(apart / periods)), best[0], best[0] - against)
+    likelihood, period = best
+    if few.count.size < count.size:
+        likelihood, period = _fit_raster(distances, best[1])
+    periods = np.maximum(np.round(distances.apart / period), 1.0)
+    usual = float(np.median(distances.apart / periods))
+    return _Corners(rows, usual, likelihood, likelihood - against)
 
 
-def _fit_raster(
-    cells: tuple[FloatArray, FloatArray], apart: FloatArray, period: float, scaleless: FloatArray
-) -> tuple[float, float]:
+@dataclass(frozen=True, eq=False)
+class _Distances:
+    """Distances (m,) of bent rows: `count` of rows, `apart` [s].
+
+    `least` and `largest` [s] are those for which the samples would be at the same rows, `scaleless`
+    the probability of each distance that obeys no raster.
+    """
+
+    count: NDArray[np.intp]
+    apart: FloatArray
+    least: FloatArray
+    largest: FloatArray
+    scaleless: FloatArray
+
+    @classmethod
+    def build(cls, time: FloatArray, first: NDArray[np.intp], last: NDArray[np.intp]) -> _Distances:
+        """Build the distances from `first` (m,) to `last` (m,) of the rows at `time` (n,) [s]."""
+        middle = np.concatenate((time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]))
+        count = last - first
+        # Of a length without a scale each octave is as likely.
+        scaleless = 1.0 / (count * np.log(time.size))
+        edges = (middle[last] - time[first], middle[last + 1] - time[first])
+        return cls(count, time[last] - time[first], *edges, scaleless)
+
+    def thin(self, count: int) -> _Distances:
+        """Return about so many distances of the whole record."""
+        some = slice(None, None, max(self.count.size // count, 1))
+        return _Distances(*(getattr(self, one.name)[some] for one in fields(self)))
+
+
+def _fit_raster(distances: _Distances, period: float) -> tuple[float, float]:
     """Fit a raster to distances of samples, some of which are not seen.
 
-    Parameters
-    ----------
-    cells : tuple of FloatArray, shape (m,)
-        Least and largest distance [s] for which the sample would be at the same row.
-    apart : FloatArray, shape (m,)
-        Distances [s].
-    period : float
-        Period to begin with [s].
-    scaleless : FloatArray, shape (m,)
-        Probability of each distance that obeys no raster.
-
-    Returns
-    -------
-    tuple of float
-        Log-likelihood, and period [s].
+    Begins with a `period` [s]; returns the log-likelihood and the period.
     """
+    apart = distances.apart
+    cells = distances.least, distances.largest
     hidden = stray = 0.1
     jitter = 0.2 * period
     best = (-np.inf, period)
@@ -265,7 +291,7 @@ def _fit_raster(
         jitter = max(jitter, 1e-3 * period)
         low, high = (_compute_normal_share((one - periods * period) / jitter) for one in cells)
         often = (1.0 - hidden) * hidden ** (periods - 1.0) * (high - low)
-        likely = stray * scaleless + (1.0 - stray) * often
+        likely = stray * distances.scaleless + (1.0 - stray) * often
         total = float(np.sum(np.log(likely)))
         if total < best[0] + 0.01:
             break
@@ -295,7 +321,7 @@ def _measure_chance(count: NDArray[np.intp], scaleless: FloatArray, rounded: boo
     begun = float(np.count_nonzero(longer))
     more = float(np.sum(count[longer] - 2.0))
     often = begun / count.size
-    stay = more / (more + begun)
+    stay = more / max(more + begun, 1.0)
     if not rounded:
         # Noise that put a row on the line by chance puts the next one there no less likely.
         stay = min(max(stay, often), 1.0 - 1.0 / count.size)

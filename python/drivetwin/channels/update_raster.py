@@ -13,7 +13,6 @@ time of the update is then taken from the raster.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,8 +177,11 @@ def count_updates(time: FloatArray, values: FloatArray, period: float) -> NDArra
     ends = time[np.append(changed, last)]
     most = np.maximum(np.diff(np.append(changed, last)), 1)
     count = np.clip(np.round(np.diff(ends) / period), 1, most).astype(int)
-    between = zip(pairwise(ends), count, strict=True)
-    instants = np.concatenate([np.linspace(*p, n, endpoint=False)[1:] for p, n in between])
+    steps = np.diff(ends) / count
+    place = np.arange(1, count.sum() - count.size + 1) - np.repeat(
+        np.cumsum(count - 1) - (count - 1), count - 1
+    )
+    instants = place * np.repeat(steps, count - 1) + np.repeat(ends[:-1], count - 1)
     nearest = np.searchsorted(time, instants - 0.5 * step)
     there = np.abs(time[nearest] - instants) <= _PAUSE * step
     return np.unique(np.concatenate((changed, nearest[there])))
