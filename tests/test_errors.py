@@ -58,3 +58,9 @@ def test_errors_and_findings_of_the_python_interface_name_no_options() -> None:
     allowed = {"errors", "vehicle/effects", "logs/survey"}
     allowed |= {"_util/request", "export/write", "vehicle/card_fields"}
     assert [one for one in left if one[0] not in allowed] == []
+
+
+def test_the_time_of_a_place_has_no_digits_below_a_sample() -> None:
+    assert str(Where(time=0.113966501)) == "t = 0.114 s"
+    assert str(Where(time=86400.12346)) == "t = 86400.1235 s"
+    assert str(Where(time=2.0)) == "t = 2 s"

@@ -41,6 +41,10 @@ INTERRUPTED = 130
 """Exit code of a program that Ctrl-C stopped."""
 
 
+_TIME_DIGITS = 4
+"""Digits after the point of a time in a message: 0.1 ms, below the step of any usual log."""
+
+
 @dataclass(frozen=True)
 class Where:
     """Location of a fault: file, channel, time [s] or key path; each part is optional."""
@@ -54,7 +58,7 @@ class Where:
         parts = [
             _quote_unprintable(self.file),
             f"channel {self.channel!r}" if self.channel is not None else None,
-            f"t = {self.time:.9g} s" if self.time is not None else None,
+            f"t = {round(self.time, _TIME_DIGITS):.9g} s" if self.time is not None else None,
             f"key {self.key!r}" if self.key is not None else None,
         ]
         return ", ".join(part for part in parts if part)
