@@ -68,7 +68,7 @@ def find_changes(time: FloatArray, values: FloatArray) -> Changes:
     """Collect the changes of a record (n,)."""
     rows = np.flatnonzero(values[1:] != values[:-1]) + 1
     sizes = values[rows] - values[rows - 1]
-    least = np.abs(sizes) < 1.5 * (estimate_resolution(values[rows]) if rows.size else 0.0)
+    least = np.abs(sizes) < 1.5 * estimate_resolution(values)
     stair = np.zeros(rows.size, dtype=bool)
     stair[1:] = least[1:] & least[:-1] & (sizes[1:] * sizes[:-1] > 0.0)
     return Changes(time[rows], time[rows] - time[rows - 1], rows, stair)

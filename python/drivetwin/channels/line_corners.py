@@ -9,7 +9,7 @@ of a measured record: its rows lie on lines by chance, or it was computed of str
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,7 @@ class LineKnots:
     period: float
 
 
+@remember_for_arrays
 def estimate_resolution(values: FloatArray) -> float:
     """Estimate the step that all `values` (n,) are rounded to.
 
@@ -218,9 +219,8 @@ def _weigh_corners(
     count = last - first
     if count.size < _MIN_DISTANCES or count.max() == 1:
         return None
-    distances = _Distances.build(time, first, last)
     # A raster has two unknowns more than a Markov chain.
-    against = _measure_chance(count, distances.scaleless, seen.rounded) + float(np.log(count.size))
+    against = _measure_chance(count, time.size, seen.rounded) + float(np.log(count.size))
     if seen.rounded:
         against -= min(_weigh_signs(seen.bends[rows - 1], 2.0 * seen.step), 0.0)
     if against + PRIOR > 0.0:  # more than a raster that fits exactly can have
@@ -232,29 +232,31 @@ def _weigh_corners(
         recorded = float(np.sum(np.minimum(steps, _PAUSE * fit[1])))
         return fit[1] * steps.size > (1.0 + _LEAST_FILLED) * recorded
 
-    few = distances.thin(_SCREENED)
+    some = slice(None, None, max(count.size // _SCREENED, 1))
+    few = _Distances.build(time, first[some], last[some])
     starts = np.unique(np.quantile(few.apart, _QUANTILES, method="lower"))
     rough = [fit for one in starts if is_filled(fit := _fit_raster(few, float(one)))]
     best = max(rough, default=(-np.inf, 0.0))
-    if best[0] < _measure_chance(few.count, few.scaleless, seen.rounded):
+    if best[0] < _measure_chance(count[some], time.size, seen.rounded):
         return None
+    every = few
+    if few.apart.size < count.size:
+        every = _Distances.build(time, first, last)
+        best = _fit_raster(every, best[1])
     likelihood, period = best
-    if few.count.size < count.size:
-        likelihood, period = _fit_raster(distances, best[1])
-    periods = np.maximum(np.round(distances.apart / period), 1.0)
-    usual = float(np.median(distances.apart / periods))
+    periods = np.maximum(np.round(every.apart / period), 1.0)
+    usual = float(np.median(every.apart / periods))
     return _Corners(rows, usual, likelihood, likelihood - against)
 
 
 @dataclass(frozen=True, eq=False)
 class _Distances:
-    """Distances (m,) of bent rows: `count` of rows, `apart` [s].
+    """Distances (m,) of bent rows: `apart` [s].
 
     `least` and `largest` [s] are those for which the samples would be at the same rows, `scaleless`
     the probability of each distance that obeys no raster.
     """
 
-    count: NDArray[np.intp]
     apart: FloatArray
     least: FloatArray
     largest: FloatArray
@@ -263,17 +265,16 @@ class _Distances:
     @classmethod
     def build(cls, time: FloatArray, first: NDArray[np.intp], last: NDArray[np.intp]) -> _Distances:
         """Build the distances from `first` (m,) to `last` (m,) of the rows at `time` (n,) [s]."""
-        middle = np.concatenate((time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]))
-        count = last - first
-        # Of a length without a scale each octave is as likely.
-        scaleless = 1.0 / (count * np.log(time.size))
-        edges = (middle[last] - time[first], middle[last + 1] - time[first])
-        return cls(count, time[last] - time[first], *edges, scaleless)
+        after = time[np.minimum(last + 1, time.size - 1)]
+        least, largest = 0.5 * (time[last] + time[last - 1]), 0.5 * (time[last] + after)
+        begin = time[first]
+        scaleless = _weigh_scaleless(last - first, time.size)
+        return cls(time[last] - begin, least - begin, largest - begin, scaleless)
 
-    def thin(self, count: int) -> _Distances:
-        """Return about so many distances of the whole record."""
-        some = slice(None, None, max(self.count.size // count, 1))
-        return _Distances(*(getattr(self, one.name)[some] for one in fields(self)))
+
+def _weigh_scaleless(count: NDArray[np.intp], rows: int) -> FloatArray:
+    """Return the probabilities (m,) of distances without a scale: each octave is as likely."""
+    return np.asarray(1.0 / (count * np.log(rows)))
 
 
 def _fit_raster(distances: _Distances, period: float) -> tuple[float, float]:
@@ -311,7 +312,7 @@ def _compute_normal_share(deviation: FloatArray) -> FloatArray:
     return np.asarray(ndtr(deviation))
 
 
-def _measure_chance(count: NDArray[np.intp], scaleless: FloatArray, rounded: bool) -> float:
+def _measure_chance(count: NDArray[np.intp], rows: int, rounded: bool) -> float:
     """Return the greatest log-likelihood of distances (m,) of bent rows in a measured record.
 
     After a bent row comes another one, or a straight stretch whose length is that of a Markov chain
@@ -328,7 +329,7 @@ def _measure_chance(count: NDArray[np.intp], scaleless: FloatArray, rounded: boo
     with np.errstate(divide="ignore", invalid="ignore"):
         chain = np.nansum([more * np.log(stay), begun * np.log(1.0 - stay)])
     entropy = -count.size * _compute_entropy(often)
-    return entropy + max(float(chain), float(np.sum(np.log(scaleless[longer]))))
+    return entropy + max(float(chain), float(np.sum(np.log(_weigh_scaleless(count[longer], rows)))))
 
 
 def _compute_entropy(share: float) -> float:
