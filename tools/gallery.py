@@ -109,8 +109,8 @@ ENTRIES = (
     Entry(
         "dual-clutch",
         "A dual-clutch gearbox",
-        "Dogs engage beforehand through their synchronisers; the torque passes from clutch to "
-        "clutch.",
+        "*Dogs* (toothed clutches) engage beforehand through their synchronisers; the torque "
+        "passes from clutch to clutch.",
         ("drivetwin drive dual-clutch-7 --course launch -o drive",),
         "drive/drive.html",
     ),

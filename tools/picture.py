@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Draw the pictures of the documents from the demo's shift and a tip-in.
 
-`python -m tools.picture` writes docs/img/validation.png (simulation over measurement),
-docs/img/report.png (first page of the report) and docs/img/fit.png (report of the fit of a
-tip-in); needs Chromium on the PATH.
+`python -m tools.picture` writes docs/img/report.png (first page of the report) and docs/img/fit.png
+(report of the fit of a tip-in); needs Chromium on the PATH.
 """
 
 from __future__ import annotations
@@ -14,8 +13,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-from plotly.io import to_html
-
 from drivetwin.cli.identify_run import IdentifyOptions, Outcome, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
@@ -25,7 +22,6 @@ from drivetwin.fit.fit import fit_network
 from drivetwin.fit.model_file import read_model
 from drivetwin.fit.read import read_recording
 from drivetwin.fit.synthesize import ModelName, read_builtin, synthesize_log
-from drivetwin.report.figures.validation import plot_validation
 from drivetwin.report.fit import render_fit
 from drivetwin.report.html import save_report
 
@@ -43,18 +39,6 @@ def identify_demo(folder: Path) -> Outcome:
     """Write the log of the demo into `folder` and identify it."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=0))
     return run_identification(log, IdentifyOptions(vehicle=card, method=DEFAULT_METHOD))
-
-
-def write_figure(outcome: Outcome, folder: Path) -> Path:
-    """Write a page with the validation figure alone."""
-    (validation,) = outcome.found.evidence.validation
-    figure = plot_validation(validation)
-    figure.merge_layout(width=WIDTH, height=HEIGHT, paper_bgcolor="white", margin={"t": 30})
-    figure.layout.pop("updatemenus")
-    path = folder / "figure.html"
-    text = to_html(figure.to_plotly(), config={"displayModeBar": False}, default_width=WIDTH)
-    path.write_text(f"<style>body {{ margin: 0 }}</style>{text}", encoding="utf-8")
-    return path
 
 
 def write_report(outcome: Outcome, folder: Path) -> Path:
@@ -87,9 +71,8 @@ def main() -> int:
     PICTURES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        outcome = identify_demo(folder)
-        for picture, page in (("validation.png", write_figure), ("report.png", write_report)):
-            draw_page(browser, page(outcome, folder), PICTURES / picture)
+        report = write_report(identify_demo(folder), folder)
+        draw_page(browser, report, PICTURES / "report.png")
         draw_page(browser, write_fit(folder), PICTURES / "fit.png")
     return 0
 
