@@ -78,6 +78,20 @@ def test_finds_linear_knots_anywhere(factor: float, phase: float) -> None:
     check_filling(factor, "linear", phase=phase, seed=1)
 
 
+@pytest.mark.parametrize("filled", [True, False])
+def test_a_long_record_is_judged_like_a_short_one(filled: bool) -> None:
+    """It has more distances than are looked at before all others."""
+    time, knots = np.arange(60_000) * STEP, np.arange(0.0, 60.1, 7.5 * STEP)
+    values = 300.0 * np.sin(0.3 * knots) + measure_speed(knots % 5.0, 2)
+    record = fill(knots, values, "linear", time)
+    record = record if filled else 300.0 * np.sin(0.3 * time) + measure_speed(time % 5.0, 2)
+    found = find_filling(time, np.round(record, 6))
+    assert (found is not None) is filled
+    if found is not None:
+        assert found.period == pytest.approx(7.5 * STEP, rel=1e-3)
+        assert found.time.size == pytest.approx(60.0 / (7.5 * STEP), rel=0.02)
+
+
 @settings(max_examples=25)
 @given(
     seed=st.integers(0, 1000),
