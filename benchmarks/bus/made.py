@@ -9,7 +9,7 @@ late, in whole percent of a reference, and slower than the speeds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +57,8 @@ class Vehicle:
     torque_period: float
     lost: float
     filled: bool
+    loads: tuple[float, ...] = ()
+    """Road load [N m] at the output shaft in the record of each shift."""
 
     def compute_swing(self, ratio: float) -> tuple[float, float]:
         """Frequency [Hz] and damping ratio in a gear."""
@@ -102,7 +104,10 @@ def draw_vehicle(rng: np.random.Generator) -> Vehicle:
 
 @dataclass(frozen=True, eq=False)
 class MadeShift:
-    """Signals of one shift on `time` (n,) [s], SI; `gears` are the places of old and new ratio."""
+    """Signals of one shift on `time` (n,) [s], SI; `gears` are the places of old and new ratio.
+
+    `load` [N m] is the road load at the output shaft.
+    """
 
     time: FloatArray
     engine: FloatArray
@@ -112,6 +117,7 @@ class MadeShift:
     gears: tuple[int, int]
     changed: float
     done: float
+    load: float
 
 
 def make_shift(vehicle: Vehicle, gears: tuple[int, int], rng: np.random.Generator) -> MadeShift:
@@ -143,7 +149,7 @@ def make_shift(vehicle: Vehicle, gears: tuple[int, int], rng: np.random.Generato
     run = simulate(model, Signal(time, torque), pressures, begin, time)
     if run.status != "completed":
         raise RuntimeError(f"simulation of a shift: {run.status}")
-    return _collect(vehicle, run, torque, gears, (opens, closes), rng)
+    return _collect(vehicle, run, torque, gears, (opens, closes), load, rng)
 
 
 def _build_model(vehicle: Vehicle, old: float, new: float, load: float) -> DualClutch:
@@ -211,6 +217,7 @@ def _collect(
     torque: FloatArray,
     gears: tuple[int, int],
     moments: tuple[float, float],
+    load: float,
     rng: np.random.Generator,
 ) -> MadeShift:
     """Speeds of all shafts; the input shaft follows the gear engaged while its clutch is open."""
@@ -232,6 +239,7 @@ def _collect(
         gears,
         reaches,
         locked + float(rng.uniform(0.05, 0.15)),
+        load,
     )
 
 
@@ -240,15 +248,17 @@ def make_drive(seed: int, folder: Path) -> tuple[Vehicle, Path]:
     rng = np.random.default_rng(seed)
     vehicle = draw_vehicle(rng)
     columns: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
+    loads: list[float] = []
     for number in range(SHIFTS):
         place = int(rng.integers(0, 2))
         gears = (place, place + 1) if rng.random() < 0.6 else (place + 1, place)
         made = make_shift(vehicle, gears, rng)
+        loads.append(made.load)
         for name, sampled in _sample(vehicle, made, rng).items():
             columns.setdefault(name, []).append((sampled[0] + 60.0 * number, sampled[1]))
     path = folder / f"drive_{seed}.csv"
     path.write_text(_format(columns, filled=vehicle.filled), encoding="utf-8")
-    return vehicle, path
+    return replace(vehicle, loads=tuple(loads)), path
 
 
 def _sample(

@@ -201,6 +201,7 @@ class Code(StrEnum):
     BUS_NO_SPAN = auto()
     BUS_K_OVER_J = auto()
     BUS_NO_RADIUS = auto()
+    BUS_LOAD_OF_SPANS = auto()
 
 
 @dataclass(frozen=True)

@@ -185,6 +185,10 @@ _BUS = (
         "mass_over_eta", "Vehicle mass over η", "m/η", "kg",
         "mass of the vehicle over the efficiency, by final drive and wheel radius", 0.0, 1e9,
     ),
+    ParameterSpec(
+        "road_load", "Road load over η", "T_L/η", "N*m",
+        "mean load torque at the gearbox output over the efficiency", -1e6, 1e6,
+    ),
 )  # fmt: skip
 
 BUS_SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _BUS}

@@ -37,6 +37,7 @@ from drivetwin.bus.quantities import (
     refuse,
 )
 from drivetwin.bus.recording import BusLog, prepare_bus_log
+from drivetwin.bus.road_load import RoadLoad
 from drivetwin.bus.scatter import Combined, combine
 from drivetwin.bus.torque import TorqueBalance
 from drivetwin.bus.torque_estimates import estimate_torques, find_dead_time
@@ -59,7 +60,7 @@ class BusIdentification:
 
     `estimates` by id, `ratios` by gear as they were used. `decays` by gear hold the joint fits,
     `predictions` those of decays that took no part, by label. `energies` are the slip energies [J]
-    of the closing clutch by shift, with standard deviation.
+    of the closing clutch by shift, with standard deviation; `loads` are the road loads by span.
     """
 
     estimates: dict[str, Estimate]
@@ -69,6 +70,7 @@ class BusIdentification:
     predictions: dict[str, DecayPrediction]
     balances: dict[str, TorqueBalance] = field(default_factory=dict)
     energies: dict[str, tuple[float, float]] = field(default_factory=dict)
+    loads: tuple[RoadLoad, ...] = ()
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -130,6 +132,7 @@ def identify_bus(
         predictions,
         torques.balances,
         torques.energies,
+        torques.loads,
         tuple(made.findings),
     )
 

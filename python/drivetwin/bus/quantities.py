@@ -17,7 +17,7 @@ _SPEEDS = {"output_speed": "output speed", "engine_speed": "engine speed"}
 
 RATIO, FREQUENCY, DAMPING, SQUARE = "ratio", "f_d", "zeta", "k_over_J"
 DELAY, DEAD_TIME, ENGINE, TOTAL = "speed_delay", "torque_delay", "J_engine", "J_total"
-VEHICLE, MASS = "J_vehicle_out", "mass_over_eta"
+VEHICLE, MASS, LOAD = "J_vehicle_out", "mass_over_eta", "road_load"
 
 
 def get_spec(stem: str, suffix: str = "") -> ParameterSpec | None:

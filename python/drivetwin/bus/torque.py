@@ -215,7 +215,7 @@ def _pool(spans: Sequence[TorqueSpan], late: float, size: int) -> _Pooled:
     """Fit all spans with a dead time; T_0, which is small, is left out."""
     rows, targets = [], []
     for one in spans:
-        wanted, other = _build_columns(one, late, size)
+        wanted, other = build_columns(one, late, size)
         swings = 0 if one.swing is None else 1
         both = np.column_stack([wanted[:, :1], other[:, other.shape[1] - swings :], one.speed])
         q, _ = np.linalg.qr(other[:, : other.shape[1] - swings])
@@ -244,18 +244,10 @@ def _fit_span(
 
     `scale` is 1/J [1/(kg m^2)], by which errors of the torque become such of the speed.
     """
-    time = one.means - one.means[0]
-    wanted, other = _build_columns(one, late, size, share)
+    wanted, other = build_columns(one, late, size, share)
     columns = np.column_stack([wanted, other])
-    basis, strength, _ = np.linalg.svd(
-        columns / np.linalg.norm(columns, axis=0), full_matrices=False
-    )
-    basis = basis[:, strength > 1e-9 * strength[0]]
     square = scale**2
-    message = square * _build_message_covariance(one, late)
-    speed = one.speed - one.speed.mean()
-    noise = fit_noise(time, basis, speed, one.floor, one.swing, known=message)
-    covariance = message + build_covariance(time, noise, one.floor, one.swing)
+    message, covariance = build_noise(one, late, columns, scale)
     nothing = ShiftValue(one.label, np.zeros(size), np.zeros((size, size)))
     try:
         factor = cho_factor(covariance, lower=True)
@@ -279,6 +271,24 @@ def _fit_span(
     return ShiftValue(one.label, value, information), float(max(wrong, 0.0))
 
 
+def build_noise(
+    one: TorqueSpan, late: float, columns: FloatArray, scale: float
+) -> tuple[FloatArray, FloatArray]:
+    """Covariances (k, k) of the speed by the torque message alone, and by all noise.
+
+    `columns` (k, p) are those of the mean, `scale` is 1/J [1/(kg m^2)].
+    """
+    time = one.means - one.means[0]
+    basis, strength, _ = np.linalg.svd(
+        columns / np.linalg.norm(columns, axis=0), full_matrices=False
+    )
+    basis = basis[:, strength > 1e-9 * strength[0]]
+    message = scale**2 * _build_message_covariance(one, late)
+    speed = one.speed - one.speed.mean()
+    noise = fit_noise(time, basis, speed, one.floor, one.swing, known=message)
+    return message, message + build_covariance(time, noise, one.floor, one.swing)
+
+
 def _build_message_covariance(one: TorqueSpan, late: float) -> FloatArray:
     """Covariance (n, n) of the impulse [N m s] by what happens between the messages.
 
@@ -298,7 +308,7 @@ def _build_message_covariance(one: TorqueSpan, late: float) -> FloatArray:
     return np.asarray((passed * sizes**2) @ passed.T)
 
 
-def _build_columns(
+def build_columns(
     one: TorqueSpan, late: float, size: int, share: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
     """Columns of 1/J, the step of d/J and T_0/J (k, size), and those of no interest (k, m).

@@ -14,6 +14,7 @@ from drivetwin.bus.phases import PhaseName, Timeline
 from drivetwin.bus.quantities import (
     DEAD_TIME,
     ENGINE,
+    LOAD,
     MASS,
     TOTAL,
     VEHICLE,
@@ -21,6 +22,7 @@ from drivetwin.bus.quantities import (
     make_id,
     refuse,
 )
+from drivetwin.bus.road_load import RoadLoad, combine_loads, estimate_loads
 from drivetwin.bus.scatter import ShiftValue
 from drivetwin.bus.torque import (
     TORQUE,
@@ -46,6 +48,7 @@ class TorqueResults:
     estimates: dict[str, Estimate] = field(default_factory=dict)
     balances: dict[str, TorqueBalance] = field(default_factory=dict)
     energies: dict[str, tuple[float, float]] = field(default_factory=dict)
+    loads: tuple[RoadLoad, ...] = ()
     findings: tuple[Finding, ...] = ()
 
 
@@ -69,7 +72,7 @@ def find_dead_time(
     return dead if Z95 * std < 4.0 * VERDICT.delay_identified else None
 
 
-_ALL = (ENGINE, VEHICLE, MASS, DEAD_TIME)
+_ALL = (ENGINE, VEHICLE, MASS, LOAD, DEAD_TIME)
 
 
 def estimate_torques(
@@ -95,15 +98,18 @@ def estimate_torques(
         _add(estimates, refuse(ENGINE, "", reason))
         alone = None
     dead = None if alone is None else alone.compute_dead_time()[0]
-    for gear, spans in _list_held(lines, ratios, decays).items():
+    held = _list_held(lines, ratios, decays)
+    for gear, spans in held.items():
         found = balance_held(spans, dead)
         if found is not None:
             balances[gear] = found
             _add(estimates, make_estimate(TOTAL, gear, *found.compute_inertia(), found.combined))
     _add_vehicle(estimates, balances, ratios, card)
+    loads = estimate_loads(held, balances, alone)
+    _add_load(estimates, loads)
     _add_dead_time(estimates, balances)
     energies = {} if alone is None else _list_energies(lines, late, alone, estimates)
-    return TorqueResults(estimates, balances, energies)
+    return TorqueResults(estimates, balances, energies, loads)
 
 
 def _add(estimates: dict[str, Estimate], one: Estimate) -> None:
@@ -188,6 +194,17 @@ def _add_vehicle(
         return
     factor = (card.final_drive.value / card.wheel_radius) ** 2
     _add(estimates, make_estimate(MASS, "", factor * value, factor * std, best.combined))
+
+
+def _add_load(estimates: dict[str, Estimate], loads: Sequence[RoadLoad]) -> None:
+    """Add the mean road load of all spans."""
+    found = combine_loads(loads)
+    if found is None:
+        reason = explain(Code.BUS_NO_SPAN, least=Number(TORQUE.min_held, "s"))
+        _add(estimates, refuse(LOAD, "", reason))
+        return
+    note = explain(Code.BUS_LOAD_OF_SPANS, count=len(loads))
+    _add(estimates, make_estimate(LOAD, "", *found, note))
 
 
 def _combine_fixed(

@@ -71,6 +71,16 @@ class BusEnergyRecord(Record):
     std: FiniteFloat
 
 
+class BusLoadRecord(Record):
+    """Road load over η [N m] at the output shaft, with the mean output speed [rad/s] of a span."""
+
+    span: str
+    gear: str
+    speed: FiniteFloat
+    torque: FiniteFloat
+    std: FiniteFloat
+
+
 class BusFile(Record):
     """Result of bus logs, SI. `parameters` by id, `ratios` by gear as they were used."""
 
@@ -83,6 +93,7 @@ class BusFile(Record):
     decays: dict[str, BusDecayRecord]
     predictions: list[BusPredictionRecord] = Field(default_factory=list)
     energies: list[BusEnergyRecord] = Field(default_factory=list)
+    loads: list[BusLoadRecord] = Field(default_factory=list)
     settings: dict[str, str] = Field(default_factory=dict)
     findings: list[FindingRecord]
 
@@ -122,6 +133,12 @@ def build_bus_file(
         energies=[
             BusEnergyRecord(shift=name, energy=value, std=std)
             for name, (value, std) in found.energies.items()
+        ],
+        loads=[
+            BusLoadRecord(
+                span=one.label, gear=one.gear, speed=one.speed, torque=one.torque, std=one.std
+            )
+            for one in found.loads
         ],
         settings=dict(settings or {}),
         findings=[FindingRecord.from_result(one) for one in (*remarks, *found.findings)],

@@ -59,6 +59,13 @@ def build_bus_sections(found: BusIdentification, remarks: Sequence[Finding] = ()
             [build_phase_table(found.timelines), *_build_energies(found)],
         ),
         Section(
+            "road-load",
+            "Road load",
+            "Load at the gearbox output over the efficiency while a gear is held, from the torque "
+            "message less inertia times acceleration.",
+            list(_build_loads(found)),
+        ),
+        Section(
             "decays",
             "Decays after lock-up",
             "Input speed of each decay, and the oscillation with the common frequency and damping.",
@@ -80,6 +87,7 @@ def build_bus_blocks(found: BusIdentification, remarks: Sequence[Finding] = ()) 
         *_build_parameters(found),
         build_phase_table(found.timelines),
         *_build_energies(found),
+        *_build_loads(found),
         *_build_decay_tables(found),
         *_build_prediction_table(found),
         *build_findings_section((*remarks, *found.findings)).blocks,
@@ -125,6 +133,18 @@ def _build_energies(found: BusIdentification) -> Iterator[Block]:
         rows.append((shift, value, half))
     columns = ("shift", ("slip energy kJ", "s"), ("± 95 %", "s"))
     yield make_table("Slip energy of the closing clutch, from engine torque", columns, rows)
+
+
+def _build_loads(found: BusIdentification) -> Iterator[Block]:
+    """Build the table of the road load by span, in the order of speed."""
+    if not found.loads:
+        return
+    rows = []
+    for one in sorted(found.loads, key=lambda one: one.speed):
+        value, half = format_uncertainty(one.torque, Z95 * one.std)
+        rows.append((one.label, one.speed * RPM.factor, value, half))
+    columns = ("span", ("n_out rpm", ".0f"), ("load over η N·m", "s"), ("± 95 %", "s"))
+    yield make_table("Road load over output speed", columns, rows)
 
 
 def _build_decay_tables(found: BusIdentification) -> Iterator[Block]:
