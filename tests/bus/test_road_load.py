@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,8 @@ def test_without_an_open_clutch_the_zero_error_widens_the_interval(
 ) -> None:
     known = estimate_loads({"2": spans}, {"2": balance}, make_open_clutch(0.5))
     loads = estimate_loads({"2": spans}, {"2": balance}, None)
+    coarse = replace(make_open_clutch(0.5), attenuation=0.2)
+    assert estimate_loads({"2": spans}, {"2": balance}, coarse) == loads
     for one, other, true in zip(loads, known, LOADS, strict=True):
         assert one.torque - other.torque == pytest.approx(RATIO * ZERO, rel=1e-6)
         assert abs(one.torque - true) < Z95 * 2.0 * one.std

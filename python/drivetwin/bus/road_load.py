@@ -24,6 +24,9 @@ from drivetwin.bus.torque import TORQUE, TorqueBalance, TorqueSpan, build_column
 
 _TIME = 1
 """Place of the load among the columns of no interest to the balance."""
+_COARSE = 0.05
+"""Share by which gaps between messages attenuate 1/J of the open clutch from which its T_0 is not
+used: a few messages fall into an open clutch then."""
 _SMALLEST = 1e-6
 """Part of a column beyond the columns before it below which it is left out."""
 
@@ -62,7 +65,8 @@ def estimate_loads(
     ----------
     spans : parts of gears held, by gear
     balances : balances by gear
-    alone : balance of the open clutch, which gives T_0; without one T_0 has its prior
+    alone : balance of the open clutch, which gives T_0; without one, or where the message is too
+        slow for it, T_0 has its prior
     """
     return tuple(
         load
@@ -127,7 +131,7 @@ def _drop_dependent(columns: FloatArray) -> FloatArray:
 
 def _get_zero(one: TorqueSpan, alone: TorqueBalance | None) -> tuple[float, float]:
     """Zero error T_0 [N m] of the message, and its standard deviation."""
-    if alone is None:
+    if alone is None or alone.attenuation > _COARSE:
         return 0.0, TORQUE.zero * float(np.max(np.abs(one.torque.values)))
     J = alone.compute_inertia()[0]
     return -J * float(alone.combined.value[2]), J * float(alone.combined.std[2])
