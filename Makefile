@@ -171,6 +171,7 @@ fleet-scaling: $(venv)/.dev native ## overhead, memory, two workers against one,
 picture: $(venv)/.dev native ## draw the pictures of the documents (needs Chromium)
 	$(bin)/python -m tools.picture
 	$(bin)/python -m tools.gallery
+	$(bin)/python -m tools.theory_figures
 	$(bin)/python -m tests.browser.pictures
 
 .PHONY: accuracy

@@ -180,6 +180,7 @@ class Shot:
 
 SHOTS: Mapping[str, Mapping[str, Shot]] = {
     "bench-log": {
+        "bench-overview": Shot("out/report.html", "#result figure"),
         "bench-simulation": Shot("out/report.html", "#validation figure", 620),
         "bench-parameters": Shot("out/report.html", "#result table"),
         "bench-friction": Shot("out/report.html", "#friction figure"),

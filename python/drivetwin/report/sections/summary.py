@@ -56,7 +56,7 @@ OF_SPEEDS = (
 )
 
 _OF_SIMULATION = (
-    "inputs, then each output as measured (grey) and simulated, with the residual below. While an "
+    "inputs, then each output as measured (thin) and simulated, with the residual below. While an "
     "element slips, the noise of its pressure sensor passes into the simulated torque and output "
     "speed, and moves the lock-up by a millisecond or two: the residual then rings after it."
 )
