@@ -78,7 +78,7 @@ def test_the_paper_like_log_returns_its_truth_within_the_intervals() -> None:
 def test_a_likelihood_that_gives_up_leaves_its_reason_and_the_integral_values(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def gives_up(*_: object) -> None:
+    def gives_up(*_: object, **__: object) -> None:
         raise IdentificationError("the search crawls", "drive on")
 
     monkeypatch.setattr(f"{LIKELIHOOD}.estimate_likelihood", gives_up)
@@ -124,7 +124,7 @@ def test_gears_held_too_briefly_for_the_linear_method_are_fitted_without_it() ->
 def test_where_neither_method_finds_anything_the_linear_one_says_what_to_record(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def gives_up(*_: object) -> None:
+    def gives_up(*_: object, **__: object) -> None:
         raise IdentificationError("the search crawls", "drive on")
 
     monkeypatch.setattr(f"{LIKELIHOOD}.estimate_without_linear", gives_up)

@@ -64,20 +64,23 @@ _LIKELIHOOD = TimedStages("likelihood estimation", ("linear", "likelihood", "pap
 _INTEGRAL = TimedStages("integral estimation", ("linear", "tolerances", "paper"))
 
 
-def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identification:
+def identify(
+    log: PreparedLog, method: Method = DEFAULT_METHOD, *, with_plants: bool = True
+) -> Identification:
     """Identify the driveline from all prepared shifts of a log.
 
     The paper's stages run beside the other methods for comparison. The likelihood method starts
     from the integral one, or alone where that has no equation, and leaves the integral result with
-    a warning where it does not converge. The results of each stage are in `evidence`.
+    a warning where it does not converge. The results of each stage are in `evidence`. With
+    `with_plants` elements beside the dual clutch are tried.
     Raises IdentificationError if the data cannot carry the method.
     """
     if log.scale_known:
         if method is not Method.PAPER:
             log = drop_unbalanced(log)
-        found, method, evidence = _estimate_torque_log(log, method)
+        found, method, evidence = _estimate_torque_log(log, method, with_plants=with_plants)
     else:
-        found, evidence = _estimate_torqueless_log(log, method)
+        found, evidence = _estimate_torqueless_log(log, method, with_plants=with_plants)
     shifts, design = tuple(s.shift for s in log.signals), log.design
     estimates, gains = check_efficiency_limit(found.estimates, design.loss_law)
     findings = (
@@ -156,7 +159,7 @@ def _report_unfitted(log: PreparedLog) -> list[Finding]:
 _Stage = tuple[EstimateSet, Method, StageResults]
 
 
-def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
+def _estimate_torque_log(log: PreparedLog, method: Method, *, with_plants: bool) -> _Stage:
     """Return the conclusions, the method that they are from, and the evidence."""
     if method is Method.PAPER:
         paper = _identify_paper_shifts(log)
@@ -174,7 +177,7 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
     except IdentificationError as error:
         if not likely:
             raise
-        return _estimate_likelihood_only(log, error)
+        return _estimate_likelihood_only(log, error, with_plants=with_plants)
     evidence = StageResults(integral=integral)
     if likely:
         try:
@@ -182,7 +185,9 @@ def _estimate_torque_log(log: PreparedLog, method: Method) -> _Stage:
                 from drivetwin.estimation.likelihood.pipeline import estimate_likelihood
 
                 linear = found, integral
-                found, fit = estimate_likelihood(log.signals, log.drivelines, linear, log.design)
+                found, fit = estimate_likelihood(
+                    log.signals, log.drivelines, linear, log.design, with_plants=with_plants
+                )
             evidence = replace(evidence, likelihood=fit)
         except IdentificationError as error:
             method, gave_up = Method.INTEGRAL, error.what
@@ -210,7 +215,9 @@ def _complete(found: EstimateSet, log: PreparedLog) -> EstimateSet:
     return complete_friction(found, {name: one.gain_prior for name, one in couplings.items()})
 
 
-def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) -> _Stage:
+def _estimate_likelihood_only(
+    log: PreparedLog, refusal: IdentificationError, *, with_plants: bool
+) -> _Stage:
     """Fit the likelihood from a start of its own where the linear method has no equation.
 
     That is so for gears engaged too briefly, and by the dissipative law for a drive whose torque
@@ -220,7 +227,9 @@ def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) ->
 
     try:
         with _LIKELIHOOD.enter("likelihood", "likelihood"):
-            found, fit = estimate_without_linear(log.signals, log.drivelines, log.design)
+            found, fit = estimate_without_linear(
+                log.signals, log.drivelines, log.design, with_plants=with_plants
+            )
     except IdentificationError:
         raise refusal from None
     failed = report(Code.LINEAR_METHOD_FAILED, why=refusal.what)
@@ -228,7 +237,9 @@ def _estimate_likelihood_only(log: PreparedLog, refusal: IdentificationError) ->
     return found, Method.LIKELIHOOD, StageResults(likelihood=fit)
 
 
-def _estimate_torqueless_log(log: PreparedLog, method: Method) -> tuple[EstimateSet, StageResults]:
+def _estimate_torqueless_log(
+    log: PreparedLog, method: Method, *, with_plants: bool
+) -> tuple[EstimateSet, StageResults]:
     """Fit a log without an output torque, which only the likelihood method can do.
 
     Raises IdentificationError for the other methods.
@@ -242,7 +253,9 @@ def _estimate_torqueless_log(log: PreparedLog, method: Method) -> tuple[Estimate
         )
     from drivetwin.estimation.likelihood.pipeline import estimate_without_linear
 
-    found, best = estimate_without_linear(log.signals, log.drivelines, log.design)
+    found, best = estimate_without_linear(
+        log.signals, log.drivelines, log.design, with_plants=with_plants
+    )
     return found, StageResults(likelihood=best)
 
 

@@ -59,7 +59,11 @@ OF_A_CONSTANT_LOAD = frozenset({"J_vehicle", "Tv_over_if"})
 
 
 def estimate_without_linear(
-    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline], design: DesignData
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[KnownDriveline],
+    design: DesignData,
+    *,
+    with_plants: bool = True,
 ) -> tuple[EstimateSet, LikelihoodFit]:
     """Fit without the linear method.
 
@@ -70,7 +74,7 @@ def estimate_without_linear(
     with _STAGES.enter("guess"):
         guess = _compute_own_guess(signals, drivelines, design)
     priors = EffectPriors(design.effects, design.sensors)
-    best = _fit(signals, drivelines, design.loss_law, guess, priors)
+    best = _fit(signals, drivelines, design.loss_law, guess, priors, with_plants=with_plants)
     with _STAGES.enter("conclusions", "intervals"):
         found = build_estimates(best.fit, signals, drivelines, {}, best.priors)
     return replace(found, findings=(*found.findings, *best.findings)), best.fit
@@ -115,16 +119,19 @@ def estimate_likelihood(
     drivelines: Sequence[KnownDriveline],
     linear: tuple[EstimateSet, Sequence[IntegralShift]],
     design: DesignData,
+    *,
+    with_plants: bool = True,
 ) -> tuple[EstimateSet, LikelihoodFit]:
     """Fit all shifts together and assess the result; `linear` is the result of the linear method.
 
+    With `with_plants` elements beside the dual clutch are tried.
     Raises IdentificationError where the fit does not reach a plausible minimum.
     """
     found, shifts = linear
     with _STAGES.enter("guess"):
         guess = _compute_guess(signals, drivelines, shifts, design)
     priors = EffectPriors(design.effects, design.sensors)
-    best = _fit(signals, drivelines, design.loss_law, guess, priors)
+    best = _fit(signals, drivelines, design.loss_law, guess, priors, with_plants=with_plants)
     with _STAGES.enter("conclusions", "intervals"):
         estimates = build_estimates(best.fit, signals, drivelines, found.friction, best.priors)
     findings = (*estimates.findings, *best.findings, *_find_disagreements(estimates, found))
@@ -146,6 +153,8 @@ def _fit(
     loss_law: LossLaw,
     guess: Mapping[str, float],
     priors: EffectPriors,
+    *,
+    with_plants: bool,
 ) -> _SelectedFit:
     """Fit the dual clutch, or a plant with an element beside it that the log supports.
 
@@ -161,7 +170,8 @@ def _fit(
             best, notes = found, tuple(report_modes(found.problem.modes))
     with _STAGES.enter("plant", "elements of the plant"):
         admitted, warnings = admit_excluded(best, priors)
-        return _SelectedFit(try_plants(best, admitted), admitted, (*notes, *warnings))
+        best = try_plants(best, admitted) if with_plants else best
+        return _SelectedFit(best, admitted, (*notes, *warnings))
 
 
 def _search_again(

@@ -127,8 +127,11 @@ def merge_tolerances(logs: Sequence[PreparedLog]) -> dict[str, SensorTolerance]:
 
 
 def _identify_single(log: PreparedLog) -> Identification:
-    """Identify a log alone. Raises IdentificationError if the likelihood does not carry it."""
-    found = identify(log)
+    """Identify a log alone, by the plant of the common fit: the dual clutch.
+
+    Raises IdentificationError if the likelihood does not carry it.
+    """
+    found = identify(log, with_plants=False)
     if found.method is not Method.LIKELIHOOD:
         raise IdentificationError(
             f"the likelihood does not explain this log by itself: {found.evidence.gave_up}",
