@@ -50,6 +50,12 @@ def remember_for_arrays(function: Callable[P, Result]) -> Callable[P, Result]:
     return remembered
 
 
+def propagate_variance(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the variances (n,) of values with `slopes` (n, p) by parameters of a `covariance`
+    (p, p)."""
+    return np.asarray(np.maximum(np.sum((slopes @ covariance) * slopes, axis=1), 0.0))
+
+
 @remember_for_arrays
 def compute_median_step(time: FloatArray) -> float:
     """Return the median distance [s] of the stamps `time` (n,), n > 1."""

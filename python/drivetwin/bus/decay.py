@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.bus.drift import (
     NoiseSize,
     Swing,
@@ -379,10 +379,10 @@ def _extrapolate(
     inverse = np.linalg.inv(whole[:used, :used])
     weights = across @ inverse
     first = columns[:used]
-    beta_covariance = np.linalg.inv(first.T @ inverse @ first)
+    beta_covariance = np.asarray(np.linalg.inv(first.T @ inverse @ first), dtype=np.float64)
     beta = beta_covariance @ (first.T @ (inverse @ record.values[:used]))
     mean = columns @ beta + weights @ (record.values[:used] - first @ beta)
     left = columns - weights @ first
     variance = np.diag(whole) - np.einsum("ij,ij->i", weights, across)
-    variance = variance + np.einsum("ij,jk,ik->i", left, beta_covariance, left)
+    variance = variance + propagate_variance(left, beta_covariance)
     return np.asarray(mean), np.asarray(np.maximum(variance, size.white**2 + record.floor**2))

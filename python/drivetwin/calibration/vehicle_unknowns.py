@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.calibration.scenarios import TwinDraws
 from drivetwin.calibration.spread import Spread
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
@@ -66,7 +66,7 @@ class FrictionUnknowns:
             slopes = law.compute_slopes(curve.slip)
             back = build_law_derivatives(law.v_s)
             law_covariance = back @ covariance @ back.T
-        half = Z95 * np.sqrt(np.einsum("pn,pq,qn->n", slopes, covariance, slopes))
+        half = Z95 * np.sqrt(propagate_variance(slopes.T, covariance))
         mu = scale * curve.mu
         place = np.interp(curve.points_slip, curve.slip, scale)
         return replace(

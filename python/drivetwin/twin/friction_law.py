@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
@@ -57,7 +57,7 @@ def compute_scale_std(curve: FrictionCurve | None) -> float:
     if curve is None or curve.stribeck is None or covariance is None:
         return whole
     slopes = curve.stribeck.compute_slopes(curve.slip)
-    variance = np.einsum("pn,pq,qn->n", slopes, covariance, slopes) / curve.mu**2
+    variance = propagate_variance(slopes.T, covariance) / curve.mu**2
     return float(np.sqrt(max(whole**2 - float(np.median(variance)), 0.0)))
 
 

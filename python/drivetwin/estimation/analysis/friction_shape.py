@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.arrays import FloatArray, Span, propagate_variance
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
@@ -246,7 +246,7 @@ def _build_curve(
         shape, corrected.mean.values[rows], corrected.covariance[rows, rows]
     )
     mu = between @ at_knots
-    half = Z95 * np.sqrt(np.einsum("np,pq,nq->n", between, spread, between))
+    half = Z95 * np.sqrt(propagate_variance(between, spread))
     return replace(
         seen,
         slip=slip,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.diagnostics.identifiability import (
     find_at_bounds,
@@ -109,7 +109,7 @@ def predict_spread(
         averaged = term.record.sample_run(run) - term.record.sample_stamps(run)
         mean = term.compute_residual(run) - residual + averaged
         rows = np.column_stack([slopes, z])
-        variance = term.record.sigma**2 + np.einsum("np,pq,nq->n", rows, joint, rows)
+        variance = term.record.sigma**2 + propagate_variance(rows, joint)
         if term.weighting.path is not None:
             variance += _propagate_inputs(term, fit.point, term.weighting.path)
         found.append(_split(term, mean, np.sqrt(variance)))
@@ -378,5 +378,5 @@ def _estimate_without_scale(
 
 def _compute_std(matrix: FloatArray, covariance: FloatArray) -> FloatArray:
     """Compute the standard deviations (q,) of parameters from the covariance of the unknowns."""
-    variance = np.einsum("qp,pr,qr->q", matrix, covariance, matrix)
+    variance = propagate_variance(matrix, covariance)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))

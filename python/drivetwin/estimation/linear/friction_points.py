@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.arrays import FloatArray, Span, propagate_variance
 from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
@@ -301,7 +301,7 @@ def _describe_fit(equations: _Equations, fit: Fit) -> FrictionFit:
     mu_points = sign * torque / (equations.element.gain * above)
     grid = np.linspace(float(slip.min()), float(slip.max()), 60)
     mu, slopes = evaluate_stribeck(fit.theta, grid)
-    std = np.sqrt(np.einsum("pn,pq,qn->n", slopes, fit.covariance[:4, :4], slopes))
+    std = np.sqrt(propagate_variance(slopes.T, fit.covariance[:4, :4]))
     v_s = float(np.exp(fit.theta[LOG_V]))
     law = Stribeck(
         mu_c=float(fit.theta[MU_C]),

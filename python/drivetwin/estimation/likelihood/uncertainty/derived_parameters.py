@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
@@ -194,7 +194,7 @@ def rank_card_numbers(
     }
     stems = np.array([get_parameter_spec(name).stem for name in ids])
     shares = np.zeros((len(ids), len(numbers)))
-    variance = np.einsum("kp,pq,kq->k", rows, covariance, rows)
+    variance = propagate_variance(rows, covariance)
     for column, (number, own) in enumerate(numbers.items()):
         cross = rows @ covariance @ own
         power = float(own @ covariance @ own)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.friction import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
@@ -113,7 +113,7 @@ def _build_curve(
         stribeck_covariance=to_law @ covariance @ to_law.T,
         over_eta=not fit.problem.terms[0].scale_known,
     )
-    return _set_band(curve, mu, np.sqrt(np.einsum("pn,pq,qn->n", slopes, covariance, slopes)))
+    return _set_band(curve, mu, np.sqrt(propagate_variance(slopes.T, covariance)))
 
 
 def _set_band(curve: FrictionCurve, mu: FloatArray, std: FloatArray) -> FrictionCurve:
@@ -130,7 +130,7 @@ def _add_shapes(
     columns = correction.step.columns.find_columns(group)
     if not columns:
         total = correction.covariance[np.ix_(index, index)]
-        return np.zeros(slip.size), np.einsum("pn,pq,qn->n", slopes, total, slopes)
+        return np.zeros(slip.size), propagate_variance(slopes.T, total)
     law = fit.point.values[index]
     largest = max(
         float(np.max(find_loaded_slips(term, fit.point, name), initial=1.0))
@@ -142,7 +142,7 @@ def _add_shapes(
     rows = np.vstack([slopes, shapes.T])
     total = correction.joint_covariance[np.ix_(both, both)]
     change = shapes @ correction.step.amounts[columns]
-    variance = np.einsum("pn,pq,qn->n", rows, total, rows)
+    variance = propagate_variance(rows.T, total)
     if correction.evidence[group].nats > SHOWN:
         return change, variance
     return np.zeros(slip.size), variance + change**2
