@@ -11,6 +11,7 @@ from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolato
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.filling import Interpolation, find_filling
+from drivetwin.channels.line_corners import estimate_resolution
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
 from drivetwin.logs.read import read_raw
 from tests.shifts.fixtures import shared
@@ -76,6 +77,16 @@ def test_finds_knots_behind_rounding(kind: str) -> None:
 def test_finds_linear_knots_anywhere(factor: float, phase: float) -> None:
     """Knots between the samples of the table as well."""
     check_filling(factor, "linear", phase=phase, seed=1)
+
+
+@pytest.mark.parametrize("digits", [5, 7, 9])
+def test_a_text_of_significant_digits_is_no_filling(digits: int) -> None:
+    """A simulation writes a smooth speed that starts at rest, so that its last decimal varies."""
+    time = np.arange(0.0, 30.0, 1e-2)
+    speed = 120.0 * (1.0 - np.exp(-0.2 * time)) + 0.3 * np.sin(7.0 * time) * np.exp(-0.3 * time)
+    written = np.array([float(f"{one:.{digits}g}") for one in speed])
+    assert estimate_resolution(written) == pytest.approx(10.0 ** (3 - digits))
+    assert find_filling(time, written) is None
 
 
 @pytest.mark.parametrize("filled", [True, False])

@@ -231,7 +231,7 @@ def _find_peaks(bends: FloatArray) -> list[tuple[float, float]]:
 
 def _refine_peak(power: FloatArray, top: int) -> float:
     """Return the position of a maximum of `power` between its samples, by a parabola of logs."""
-    if not 0 < top < power.size - 1:
+    if not 0 < top < power.size - 1 or power[top - 1 : top + 2].min() <= 0.0:
         return float(top)
     left, middle, right = np.log(power[top - 1 : top + 2])
     bend = left - 2.0 * middle + right

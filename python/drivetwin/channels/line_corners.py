@@ -32,6 +32,8 @@ _PAUSE = 5.0
 """Time between rows that is a pause of the record, as for gaps of a channel [periods]."""
 _ROUNDS = 20
 """Steps of such a search [count]: cost of work."""
+_MOST_DIGITS = 12
+"""Most significant digits of a text [count]: of more, round-off hides the multiples."""
 _SCREENED = 2000
 """Values or distances that are looked at before all others [count]: cost of work. A filling shows
 in any of them."""
@@ -53,22 +55,48 @@ class LineKnots:
 def estimate_resolution(values: FloatArray) -> float:
     """Estimate the step that all `values` (n,) are rounded to.
 
-    That of a lattice, else of the last decimal of a text, else the round-off of the numbers.
+    That of a lattice, else of the last decimal of a text, else of the largest number of a text with
+    so many significant digits, else the round-off of the numbers.
     """
     largest = float(np.abs(values).max(initial=0.0))
     round_off = ROUND_OFF * largest
     if np.array_equal(values, values.astype(np.float32)):
         round_off = float(np.spacing(np.float32(largest)))
     few = values[:: max(values.size // _SCREENED, 1)]
+    found = round_off
     for step in 10.0 ** -np.arange(0.0, 16.0):
         if step < round_off:
             break
         if _are_multiples(few, step) and _are_multiples(values, step):
-            return max(float(step), estimate_rounding_step(values))
-    return max(round_off, estimate_rounding_step(values))
+            found = float(step)
+            break
+    for digits in range(1, _MOST_DIGITS + 1):
+        if _have_digits(few, digits) and _have_digits(values, digits):
+            found = _choose_step(values, found, 10.0 ** (np.floor(np.log10(largest)) + 1 - digits))
+            break
+    return max(found, estimate_rounding_step(values))
 
 
-def _are_multiples(values: FloatArray, step: float) -> bool:
+def _choose_step(values: FloatArray, even: float, coarse: float) -> float:
+    """Choose the step of the largest numbers: the `even` one of all, or the `coarse` one of a text
+    with so many significant digits, whose smaller numbers have finer steps.
+
+    A number that is rounded to even steps fits the coarse one by a chance of their ratio.
+    """
+    decade = 10.0 ** np.floor(np.log10(np.abs(values).max()))
+    large = values[np.abs(values) >= decade]
+    seen = np.unique(large[:_SCREENED]).size
+    return coarse if seen * np.log(max(coarse / even, 1.0)) > PRIOR else even
+
+
+def _have_digits(values: FloatArray, digits: int) -> bool:
+    """Return True if all numbers (n,) have at most so many significant digits."""
+    size = np.abs(values[values != 0.0])
+    steps = 10.0 ** (np.floor(np.log10(size)) + 1.0 - digits)
+    return bool(size.size and np.all(np.isfinite(steps)) and _are_multiples(size, steps))
+
+
+def _are_multiples(values: FloatArray, step: float | FloatArray) -> bool:
     scaled = values / step
     return bool(np.all(np.abs(scaled - np.round(scaled)) <= _WHOLE))
 
