@@ -60,7 +60,9 @@ def estimate_resolution(values: FloatArray) -> float:
     """
     largest = float(np.abs(values).max(initial=0.0))
     round_off = ROUND_OFF * largest
-    if np.array_equal(values, values.astype(np.float32)):
+    with np.errstate(over="ignore"):
+        is_single = np.array_equal(values, values.astype(np.float32))
+    if is_single:
         round_off = float(np.spacing(np.float32(largest)))
     few = values[:: max(values.size // _SCREENED, 1)]
     found = round_off
@@ -93,7 +95,8 @@ def _have_digits(values: FloatArray, digits: int) -> bool:
     """Return True if all numbers (n,) have at most so many significant digits."""
     size = np.abs(values[values != 0.0])
     steps = 10.0 ** (np.floor(np.log10(size)) + 1.0 - digits)
-    return bool(size.size and np.all(np.isfinite(steps)) and _are_multiples(size, steps))
+    known = bool(np.all((steps > 0.0) & np.isfinite(steps)))  # not below the smallest number
+    return size.size > 0 and known and _are_multiples(size, steps)
 
 
 def _are_multiples(values: FloatArray, step: float | FloatArray) -> bool:
