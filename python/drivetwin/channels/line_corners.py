@@ -190,10 +190,12 @@ def has_short_lines(time: FloatArray, values: FloatArray) -> bool:
     short.
     """
     seen = _measure_bends(time, values)
+    if seen.rounded:
+        return False
     straight = np.abs(seen.bends) <= seen.step
     runs = [(a, b) for a, b in find_true_runs(straight) if not seen.rest[a:b].any()]
     lengths = np.array([end - first for first, end in runs], dtype=float)
-    if lengths.size < _MIN_DISTANCES or seen.rounded:
+    if lengths.size < _MIN_DISTANCES:
         return False
     by_chance = _weigh_straight(lengths.size, _expect_straight(seen, np.flatnonzero(~straight) + 1))
     stay = min(1.0 - lengths.size / float(np.sum(lengths)), _MOST_FILLED)
