@@ -10,16 +10,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.bus.made import make_drive
+from benchmarks.bus.made import RECORD, make_drive
 from benchmarks.bus.study import FINAL_DRIVE, RADIUS
 from drivetwin.bus.identify import identify_bus
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.vehicle.spec import PriorValue
-
-_RECORD = 60.0
-"""Time from the record of one shift to the next [s]."""
 
 
 def study_loads(seed: int) -> tuple[float, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
@@ -39,7 +36,7 @@ def study_loads(seed: int) -> tuple[float, np.ndarray[tuple[int, int], np.dtype[
     for one in found.loads:
         start = re.search(r"from ([\d.]+) s", one.label)
         assert start is not None
-        truth = vehicle.loads[int(float(start[1]) // _RECORD)] / vehicle.eta
+        truth = vehicle.loads[int(float(start[1]) // RECORD)] / vehicle.eta
         rows.append((one.torque - truth, one.std, truth))
     return vehicle.torque_period, np.array(rows).reshape(-1, 3)
 

@@ -29,6 +29,8 @@ from drivetwin.simulation.dual_clutch import (
 RPM = np.pi / 30.0
 SHIFTS = 20
 """Shifts of a drive, as the study states it."""
+RECORD = 60.0
+"""Time from the record of one shift to the next [s]: longer than a record, so that each is alone."""
 _LENGTH, _BEFORE = 11.0, 4.0
 """Length of the record of a shift and time before the clutch opens [s]."""
 _STEP = 2e-3
@@ -255,7 +257,7 @@ def make_drive(seed: int, folder: Path) -> tuple[Vehicle, Path]:
         made = make_shift(vehicle, gears, rng)
         loads.append(made.load)
         for name, sampled in _sample(vehicle, made, rng).items():
-            columns.setdefault(name, []).append((sampled[0] + 60.0 * number, sampled[1]))
+            columns.setdefault(name, []).append((sampled[0] + RECORD * number, sampled[1]))
     path = folder / f"drive_{seed}.csv"
     path.write_text(_format(columns, filled=vehicle.filled), encoding="utf-8")
     return replace(vehicle, loads=tuple(loads)), path

@@ -70,9 +70,9 @@ def test_shifts_of_a_bus_log_have_the_phases_of_the_identification(
     path = tmp_path / "faulty.toml"
     path.write_text('[[gears]]\nname = "1"\nratio = -2.0\n', encoding="utf-8")
     assert main(["shifts", str(logs[0]), "--vehicle", str(path)]) == 2
-    told = capsys.readouterr().err
-    assert "gears[0].ratio" in told
-    assert "elements" not in told
+    printed = capsys.readouterr().err
+    assert "gears[0].ratio" in printed
+    assert "elements" not in printed
 
 
 def test_an_output_torque_needs_a_vehicle_card(
