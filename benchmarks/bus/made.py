@@ -30,7 +30,7 @@ RPM = np.pi / 30.0
 SHIFTS = 20
 """Shifts of a drive, as the study states it."""
 RECORD = 60.0
-"""Time from the record of one shift to the next [s]: longer than a record, so that each is alone."""
+"""Time from the record of one shift to the next [s]: longer than a record."""
 _LENGTH, _BEFORE = 11.0, 4.0
 """Length of the record of a shift and time before the clutch opens [s]."""
 _STEP = 2e-3
