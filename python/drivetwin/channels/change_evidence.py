@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, remember_for_arrays
 from drivetwin.channels.line_corners import PRIOR, estimate_resolution
 
 _ROUNDS = 8
@@ -66,12 +66,17 @@ class Changes:
 
 def find_changes(time: FloatArray, values: FloatArray) -> Changes:
     """Collect the changes of a record (n,)."""
-    rows = np.flatnonzero(values[1:] != values[:-1]) + 1
+    rows = _find_changed_rows(values)
     sizes = values[rows] - values[rows - 1]
     least = np.abs(sizes) < 1.5 * estimate_resolution(values)
     stair = np.zeros(rows.size, dtype=bool)
     stair[1:] = least[1:] & least[:-1] & (sizes[1:] * sizes[:-1] > 0.0)
     return Changes(time[rows], time[rows] - time[rows - 1], rows, stair)
+
+
+def _find_changed_rows(values: FloatArray) -> NDArray[np.intp]:
+    """Return the rows (m,) whose value differs from the one before."""
+    return np.flatnonzero(values[1:] != values[:-1]) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,17 +95,25 @@ class ChangeRaster:
     loose: bool
 
 
-def find_change_raster(changes: Changes) -> ChangeRaster | None:
-    """Find the raster on which changes lie.
+@remember_for_arrays
+def find_change_raster(time: FloatArray, values: FloatArray) -> ChangeRaster | None:
+    """Find the raster on which the changes of a record lie.
+
+    Parameters
+    ----------
+    time, values : FloatArray, shape (n,)
+        Record [s].
 
     Returns
     -------
     ChangeRaster or None
         None where a signal that each row has measured is as likely.
     """
-    repeats = _list_repeats(changes)
+    # Changes are not collected where most rows show one, as in any record with fine noise.
+    repeats = _list_repeats(_find_changed_rows(values))
     if not repeats:
         return None
+    changes = find_changes(time, values)
     against = _weigh_alternatives(changes)
     if against + PRIOR > 0.0:  # more than a raster that fits exactly can have
         return None
@@ -122,16 +135,16 @@ def _weigh_alternatives(changes: Changes) -> float:
     return max(weigh_measured(changes), _weigh_irregular(np.diff(changes.rows)) - PRIOR)
 
 
-def _list_repeats(changes: Changes) -> list[int]:
-    """List distances of changes that may be the rows of a period, the most frequent ones.
+def _list_repeats(changed: NDArray[np.intp]) -> list[int]:
+    """List distances of `changed` rows (m,) that may be the rows of a period, the most frequent.
 
     Updates are no rarer than changes. Where most changes follow in the next row there is no raster
     of two rows or more.
     """
-    rows = np.diff(changes.rows)
-    apart, often = np.unique(rows, return_counts=True)
-    if rows.size < 2 or (apart[0] == 1 and 2 * often[0] > rows.size):
+    rows = np.diff(changed)
+    if rows.size < 2 or 2 * np.count_nonzero(rows == 1) > rows.size:
         return []
+    apart, often = np.unique(rows, return_counts=True)
     frequent = apart[np.argsort(-often, kind="stable")][:_TRIED]
     return [int(one) for one in frequent if 1 < one <= 2.0 * np.mean(rows)]
 

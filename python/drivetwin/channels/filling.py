@@ -17,7 +17,7 @@ their evidence, the logarithm of the ratio of their probabilities:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -34,14 +34,16 @@ from drivetwin.channels.knot_fit import MIN_KNOTS, KnotRaster, extend_knots, fin
 from drivetwin.channels.line_corners import (
     PRIOR,
     ROUND_OFF,
+    LineKnots,
     estimate_resolution,
     find_corners,
     has_short_lines,
     list_blurs,
 )
 
-_WINDOW, _WINDOWS = 8192, 4
-"""Rows of a window, and windows of a long record searched for a raster [count]: cost of work."""
+_WINDOW, _LINES_WINDOW, _WINDOWS = 8192, 65536, 4
+"""Rows of a window that is searched for a raster or for straight lines, and windows of a long
+record [count]: cost of work."""
 _CYCLE = 2048
 """Changes that show whether numbers repeat in turn [count]: cost of work."""
 _LARGEST = 1e150
@@ -105,7 +107,7 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     if _is_cycle(values[1:][np.diff(values) != 0.0][:_CYCLE]):
         return None
     step = compute_median_step(time)
-    lines = find_corners(time, values)
+    lines = _find_lines(time, values)
     if lines is not None:
         return Filling(Interpolation.LINEAR, lines.period, step, lines.time, lines.values)
     for part in _list_windows(time, values):
@@ -114,25 +116,43 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
         if filling is not None:
             return filling
     for stride in _STRIDES if len(list_blurs(time)) > 1 else ():
-        lines = find_corners(time[::stride], values[::stride])
+        lines = _find_lines(time[::stride], values[::stride])
         if lines is not None:
             return Filling(Interpolation.LINEAR, lines.period, step, lines.time, lines.values)
     nothing = np.empty(0)
     unknown = Filling(Interpolation.UNKNOWN, np.nan, step, nothing, nothing)
-    return unknown if has_short_lines(time, values) else None
+    parts = _list_liveliest(values, _cut(0, time.size, _LINES_WINDOW))
+    return unknown if any(has_short_lines(time[part], values[part]) for part in parts) else None
 
 
-def _list_windows(time: FloatArray, values: FloatArray) -> Iterator[slice]:
+def _find_lines(time: FloatArray, values: FloatArray) -> LineKnots | None:
+    """Find knots of straight lines; in a long record only where one of its windows has some."""
+    parts = _list_liveliest(values, _cut(0, time.size, _LINES_WINDOW))
+    if len(parts) > 1 and all(find_corners(time[part], values[part]) is None for part in parts):
+        return None
+    return find_corners(time, values)
+
+
+def _cut(first: int, end: int, length: int) -> list[slice]:
+    """Cut the rows from `first` to `end` (excluded) into windows of a `length`."""
+    return [slice(start, min(start + length, end)) for start in range(first, end, length)]
+
+
+def _list_liveliest(values: FloatArray, parts: Sequence[slice]) -> list[slice]:
+    """List the windows with the most changes, the liveliest first."""
+    changes = [np.count_nonzero(np.diff(values[part])) for part in parts]
+    liveliest = np.argsort(-np.asarray(changes), kind="stable")[:_WINDOWS]
+    return [parts[k] for k in liveliest if changes[k] >= MIN_KNOTS]
+
+
+def _list_windows(time: FloatArray, values: FloatArray) -> list[slice]:
     """List evenly sampled stretches, the liveliest of a long record first."""
     step = compute_median_step(time)
     even = np.abs(np.diff(time) - step) < 0.5 * step
-    parts = []
-    for first, end in find_true_runs(even, 8 * MIN_KNOTS):
-        for start in range(first, end + 1, _WINDOW):
-            parts.append(slice(start, min(start + _WINDOW, end + 1)))
-    changes = [np.count_nonzero(np.diff(values[part])) for part in parts]
-    liveliest = np.argsort(-np.asarray(changes), kind="stable")[:_WINDOWS]
-    return (parts[k] for k in liveliest if changes[k] >= MIN_KNOTS)
+    runs = find_true_runs(even, 8 * MIN_KNOTS)
+    return _list_liveliest(
+        values, [part for first, end in runs for part in _cut(first, end + 1, _WINDOW)]
+    )
 
 
 def _find_raster(time: FloatArray, values: FloatArray) -> KnotRaster | None:

@@ -23,7 +23,7 @@ from drivetwin._util.arrays import (
     is_time_axis,
     remember_for_arrays,
 )
-from drivetwin.channels.change_evidence import ChangeRaster, find_change_raster, find_changes
+from drivetwin.channels.change_evidence import ChangeRaster, find_change_raster
 
 _UNEVEN = 0.02
 """Part of a step that a period may have over a number of whole ones and count as divided by it: the
@@ -59,19 +59,12 @@ def find_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
     """
     if not is_time_axis(time):
         return None
-    found = _find_hold(time, values)
+    found = find_change_raster(time, values)
     if found is None:
         return None
     if found.loose:
         return UpdateRaster(float(time[0]), found.period)
     return _make_raster(found, _find_clock(time))
-
-
-@remember_for_arrays
-def _find_hold(time: FloatArray, values: FloatArray) -> ChangeRaster | None:
-    """Find the raster on which the values change; None where each sample may be an update."""
-    changes = find_changes(time, values)
-    return find_change_raster(changes)
 
 
 def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
@@ -159,7 +152,7 @@ def find_updates(
     raster = find_raster(time, values)
     if raster is None:
         return None
-    found = _find_hold(time, values)
+    found = find_change_raster(time, values)
     if found is not None and not found.loose and np.all(np.diff(found.count) > 0.0):
         fresh, count = _match_updates(time, values, raster)
         if raster.early > 0.0:
