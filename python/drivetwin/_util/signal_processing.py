@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, remember_for_arrays
 
 _ROUND_OFF = 1e-9
 """Distance of two numbers, relative to the largest, below which they are one number."""
@@ -68,8 +68,7 @@ def estimate_resolution(values: FloatArray) -> float:
 
     Successive samples need not show it: along a ramp they may be many steps apart.
     """
-    gaps = _find_gaps(values)
-    return float(gaps.min()) if gaps.size else 0.0
+    return _measure_gaps(values)[0]
 
 
 def estimate_rounding_step(values: FloatArray) -> float:
@@ -77,20 +76,30 @@ def estimate_rounding_step(values: FloatArray) -> float:
 
     0 otherwise, and for fewer than 10 changes, which do not show a rounding step.
     """
-    least = _ROUND_OFF * max(float(np.max(np.abs(values))), _ROUND_OFF)
-    gaps = _find_gaps(values)
-    if not gaps.size or np.count_nonzero(np.abs(np.diff(values)) > least) < _MIN_CHANGES:
+    step, is_lattice = _measure_gaps(values)
+    if not is_lattice:
         return 0.0
-    multiples = gaps / gaps.min()
-    deviation = float(np.max(np.abs(multiples - np.round(multiples))))
-    return float(gaps.min()) if deviation < _MULTIPLE_TOLERANCE else 0.0
+    least = _find_round_off(values)
+    return step if np.count_nonzero(np.abs(np.diff(values)) > least) >= _MIN_CHANGES else 0.0
 
 
-def _find_gaps(values: FloatArray) -> FloatArray:
-    """Return the distances (m,) of neighbouring numbers in sorted order, without round-off."""
+@remember_for_arrays
+def _measure_gaps(values: FloatArray) -> tuple[float, bool]:
+    """Return the least distance of neighbouring numbers in sorted order, 0 if all are one, and
+    whether all distances are its multiples. Those of round-off do not count."""
     gaps = np.diff(np.unique(values))
-    least = _ROUND_OFF * max(float(np.abs(values).max(initial=0.0)), _ROUND_OFF)
-    return np.asarray(gaps[gaps > least])
+    gaps = gaps[gaps > _find_round_off(values)]
+    if not gaps.size:
+        return 0.0, False
+    step = float(gaps.min())
+    multiples = gaps / step
+    deviation = float(np.max(np.abs(multiples - np.round(multiples))))
+    return step, deviation < _MULTIPLE_TOLERANCE
+
+
+def _find_round_off(values: FloatArray) -> float:
+    """Return the distance below which two of the `values` (n,) are one number."""
+    return _ROUND_OFF * max(float(np.abs(values).max(initial=0.0)), _ROUND_OFF)
 
 
 def apply_lag(values: FloatArray, step: float, time_constant: float) -> FloatArray:

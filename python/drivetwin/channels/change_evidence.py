@@ -66,17 +66,12 @@ class Changes:
 
 def find_changes(time: FloatArray, values: FloatArray) -> Changes:
     """Collect the changes of a record (n,)."""
-    rows = _find_changed_rows(values)
+    rows = np.flatnonzero(values[1:] != values[:-1]) + 1
     sizes = values[rows] - values[rows - 1]
     least = np.abs(sizes) < 1.5 * estimate_resolution(values)
     stair = np.zeros(rows.size, dtype=bool)
     stair[1:] = least[1:] & least[:-1] & (sizes[1:] * sizes[:-1] > 0.0)
     return Changes(time[rows], time[rows] - time[rows - 1], rows, stair)
-
-
-def _find_changed_rows(values: FloatArray) -> NDArray[np.intp]:
-    """Return the rows (m,) whose value differs from the one before."""
-    return np.flatnonzero(values[1:] != values[:-1]) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +104,13 @@ def find_change_raster(time: FloatArray, values: FloatArray) -> ChangeRaster | N
     ChangeRaster or None
         None where a signal that each row has measured is as likely.
     """
-    # Changes are not collected where most rows show one, as in any record with fine noise.
-    repeats = _list_repeats(_find_changed_rows(values))
+    changed = values[1:] != values[:-1]
+    if 2 * np.count_nonzero(changed[1:] & changed[:-1]) >= np.count_nonzero(changed):
+        return None  # Most changes follow in the next row: none of two rows or more is a period.
+    changes = find_changes(time, values)
+    repeats = _list_repeats(changes)
     if not repeats:
         return None
-    changes = find_changes(time, values)
     against = _weigh_alternatives(changes)
     if against + PRIOR > 0.0:  # more than a raster that fits exactly can have
         return None
@@ -135,14 +132,13 @@ def _weigh_alternatives(changes: Changes) -> float:
     return max(weigh_measured(changes), _weigh_irregular(np.diff(changes.rows)) - PRIOR)
 
 
-def _list_repeats(changed: NDArray[np.intp]) -> list[int]:
-    """List distances of `changed` rows (m,) that may be the rows of a period, the most frequent.
+def _list_repeats(changes: Changes) -> list[int]:
+    """List distances of changes that may be the rows of a period, the most frequent ones.
 
-    Updates are no rarer than changes. Where most changes follow in the next row there is no raster
-    of two rows or more.
+    Updates are no rarer than changes.
     """
-    rows = np.diff(changed)
-    if rows.size < 2 or 2 * np.count_nonzero(rows == 1) > rows.size:
+    rows = np.diff(changes.rows)
+    if rows.size < 2:
         return []
     apart, often = np.unique(rows, return_counts=True)
     frequent = apart[np.argsort(-often, kind="stable")][:_TRIED]

@@ -64,30 +64,30 @@ def estimate_resolution(values: FloatArray) -> float:
         is_single = np.array_equal(values, values.astype(np.float32))
     if is_single:
         round_off = float(np.spacing(np.float32(largest)))
-    few = values[:: max(values.size // _SCREENED, 1)]
+    numbers = np.unique(values)
+    few = numbers[:: max(numbers.size // _SCREENED, 1)]
     found = round_off
     for step in 10.0 ** -np.arange(0.0, 16.0):
         if step < round_off:
             break
-        if _are_multiples(few, step) and _are_multiples(values, step):
+        if _are_multiples(few, step) and _are_multiples(numbers, step):
             found = float(step)
             break
     for digits in range(1, _MOST_DIGITS + 1):
-        if _have_digits(few, digits) and _have_digits(values, digits):
-            found = _choose_step(values, found, 10.0 ** (np.floor(np.log10(largest)) + 1 - digits))
+        if _have_digits(few, digits) and _have_digits(numbers, digits):
+            found = _choose_step(numbers, found, 10.0 ** (np.floor(np.log10(largest)) + 1 - digits))
             break
     return max(found, estimate_rounding_step(values))
 
 
-def _choose_step(values: FloatArray, even: float, coarse: float) -> float:
-    """Choose the step of the largest numbers: the `even` one of all, or the `coarse` one of a text
-    with so many significant digits, whose smaller numbers have finer steps.
+def _choose_step(numbers: FloatArray, even: float, coarse: float) -> float:
+    """Choose the step of the largest of different `numbers` (m,): the `even` one of all, or the
+    `coarse` one of a text with so many significant digits, whose smaller numbers have finer steps.
 
     A number that is rounded to even steps fits the coarse one by a chance of their ratio.
     """
-    decade = 10.0 ** np.floor(np.log10(np.abs(values).max()))
-    large = values[np.abs(values) >= decade]
-    seen = np.unique(large[:_SCREENED]).size
+    decade = 10.0 ** np.floor(np.log10(np.abs(numbers).max()))
+    seen = int(np.count_nonzero(np.abs(numbers) >= decade))
     return coarse if seen * np.log(max(coarse / even, 1.0)) > PRIOR else even
 
 

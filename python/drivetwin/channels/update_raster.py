@@ -78,6 +78,7 @@ def _follow_at_once(time: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(np.diff(time) <= _PAUSE * compute_median_step(time))
 
 
+@remember_for_arrays
 def _find_clock(time: FloatArray) -> float | None:
     """Return the step [s] of a logger that samples by a clock; None for stamps of messages."""
     rows = np.diff(time) / compute_median_step(time)

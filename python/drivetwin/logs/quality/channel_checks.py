@@ -21,6 +21,7 @@ from drivetwin.logs.quality.jumps import check_jumps, find_lost_messages
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,
+    compute_usual_step,
     find_clipping,
     find_dropouts,
     find_glitches,
@@ -400,7 +401,7 @@ def _check_wraps(channel: Channel, where: Where) -> None:
     values, span = channel.values, float(np.ptp(channel.values))
     near = WRAP_BESIDE
     steps = np.abs(np.diff(values))
-    usual = float(np.median(steps[steps > 0.0])) if steps.any() else 0.0
+    usual = compute_usual_step(values)
     jumps = np.flatnonzero(steps > max(WRAP_SHARE * span, WRAP_CONTRAST * usual))
     for index in jumps[(jumps >= near) & (jumps < values.size - near - 1)]:
         jump = float(values[index + 1] - values[index])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from drivetwin._util.arrays import compute_median_step
+from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import FloatArray
@@ -157,8 +157,8 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
         return None
     steps = np.abs(np.diff(values))
     least = max(
-        _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
-        _SPIKE_CONTRAST * _compute_median(steps[steps > 0.0]) if steps.any() else np.inf,
+        _SPIKE_SHARE * _compute_usual_range(values),
+        _SPIKE_CONTRAST * compute_usual_step(values) if steps.any() else np.inf,
     )
     interval = compute_median_step(time)
     for width in range(1, _SPIKE_WIDTH + 1):
@@ -199,6 +199,20 @@ def _compute_median(values: FloatArray) -> float:
     return float(np.median(values, overwrite_input=True))
 
 
+@remember_for_arrays
+def compute_usual_step(values: FloatArray) -> float:
+    """Compute the median size of the steps of `values` (n,) that move; 0 without any."""
+    steps = np.abs(np.diff(values))
+    moving = steps[steps > 0.0]
+    return _compute_median(moving) if moving.size else 0.0
+
+
+@remember_for_arrays
+def _compute_usual_range(values: FloatArray) -> float:
+    """Compute the range of `values` (n,) without the extreme two percent on each side."""
+    return float(np.ptp(np.percentile(values, [2, 98])))
+
+
 def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches, longer than spikes, that a calm torque jumps to and back from in one sample each.
 
@@ -210,8 +224,7 @@ def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
     if values.size < 4 * _SURROUNDINGS or not size.any():
         return None
     least = max(
-        _SPIKE_SHARE * float(np.ptp(np.percentile(values, [2, 98]))),
-        _SPIKE_CONTRAST * _compute_median(size[size > 0.0]),
+        _SPIKE_SHARE * _compute_usual_range(values), _SPIKE_CONTRAST * compute_usual_step(values)
     )
     mask = np.zeros(values.size, np.bool_)
     for first, last in pairwise(np.flatnonzero(size > least)):
@@ -236,11 +249,11 @@ def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dama
     """
     steps = np.diff(values)
     same, moving = steps == 0.0, np.abs(steps)
-    changes = moving[~same]
-    usual = _compute_median(changes) if changes.size else np.inf
+    changes = steps.size - int(np.count_nonzero(same))
+    usual = compute_usual_step(values) if changes else np.inf
     long = find_true_runs(same, _STUCK_SAMPLES)
     outside = steps.size - sum(end - start for start, end in long)
-    fine = outside >= _ENOUGH and changes.size > _MOVING * outside
+    fine = outside >= _ENOUGH and changes > _MOVING * outside
     mask = np.zeros(values.size, np.bool_)
     for start, end in long:
         if values[start] == 0.0:
