@@ -46,6 +46,18 @@ def integrate_trapezoids(values: FloatArray, time: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros((1, *values.shape[1:])), areas.cumsum(axis=0)])
 
 
+_BLOCKS, _BLOCK = 64, 2048
+"""Blocks and rows of one [count] that show a quantile of a long record within 0.3 % of its rows."""
+
+
+def sample_blocks(values: FloatArray) -> FloatArray:
+    """Return evenly spread blocks of a record (n,), one a row; a short record is one block."""
+    if values.size <= _BLOCKS * _BLOCK:
+        return values[None]
+    starts = np.linspace(0, values.size - _BLOCK, _BLOCKS).astype(int)
+    return np.asarray(values[starts[:, None] + np.arange(_BLOCK)])
+
+
 def find_true_runs(mask: NDArray[np.bool_], least: int = 1) -> list[tuple[int, int]]:
     """Return first index and end (one past the last) of each run of True in `mask` (n,).
 

@@ -230,11 +230,15 @@ def _weigh_signs(bends: FloatArray, largest: float) -> float:
     return float(np.log(3.0)) * (2 * changes - max(small.size - 1, 0))
 
 
+@remember_for_arrays
 def list_blurs(time: FloatArray) -> tuple[float, ...]:
     """Return the steps [s] to which stamps may be rounded; even ones are exact."""
-    blur, steps = estimate_resolution(time), np.diff(time)
-    even = bool(np.ptp(steps) <= 2.0 * blur)
-    return (0.0,) if even else (0.0, blur)
+    unevenness = float(np.ptp(np.diff(time)))
+    # No resolution is finer than round-off.
+    if unevenness <= 2.0 * ROUND_OFF * float(np.abs(time).max()):
+        return (0.0,)
+    blur = estimate_resolution(time)
+    return (0.0,) if unevenness <= 2.0 * blur else (0.0, blur)
 
 
 def _weigh_corners(

@@ -356,7 +356,10 @@ class _Conversion:
         return time if self.spec.time_shift == 0.0 else time + self.spec.time_shift
 
     def convert_values(self, values: FloatArray) -> FloatArray:
-        return self.unit.to_si(self.spec.sign * (self.spec.scale * values + self.spec.offset))
+        spec, unit = self.spec, self.unit
+        if (spec.sign, spec.scale, spec.offset, unit.factor, unit.offset) == (1, 1, 0, 1, 0):
+            return values  # properties that are kept with the array hold
+        return unit.to_si(spec.sign * (spec.scale * values + spec.offset))
 
     def convert_filling(self, filling: Filling) -> Filling:
         time, values = self.convert_time(filling.time), self.convert_values(filling.values)

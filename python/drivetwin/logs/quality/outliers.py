@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from drivetwin._util.arrays import compute_median_step, remember_for_arrays
-from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
+from drivetwin._util.signal_processing import (
+    estimate_resolution,
+    find_true_runs,
+    sample_blocks,
+)
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import Where
@@ -202,7 +206,7 @@ def _compute_median(values: FloatArray) -> float:
 @remember_for_arrays
 def compute_usual_step(values: FloatArray) -> float:
     """Compute the median size of the steps of `values` (n,) that move; 0 without any."""
-    steps = np.abs(np.diff(values))
+    steps = np.abs(np.diff(sample_blocks(values)))
     moving = steps[steps > 0.0]
     return _compute_median(moving) if moving.size else 0.0
 
@@ -210,7 +214,7 @@ def compute_usual_step(values: FloatArray) -> float:
 @remember_for_arrays
 def _compute_usual_range(values: FloatArray) -> float:
     """Compute the range of `values` (n,) without the extreme two percent on each side."""
-    return float(np.ptp(np.percentile(values, [2, 98])))
+    return float(np.ptp(np.percentile(sample_blocks(values), [2, 98])))
 
 
 def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
@@ -293,7 +297,7 @@ def find_stale(values: FloatArray) -> Damage | None:
 
 def _estimate_white_noise(values: FloatArray) -> float:
     """Standard deviation of the noise of `values` (n,) from its third difference."""
-    return _compute_median(np.abs(np.diff(values, 3))) / _THIRD_DIFFERENCE
+    return _compute_median(np.abs(np.diff(sample_blocks(values), 3))) / _THIRD_DIFFERENCE
 
 
 def _is_noisy(steps: FloatArray, usual: float) -> bool:
@@ -344,7 +348,7 @@ def _estimate_noise(codes: FloatArray) -> float:
 
 def find_dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches of exact zeros that the signal falls to, and leaves, in one step."""
-    level = float(np.percentile(np.abs(values), 98.0))
+    level = float(np.percentile(np.abs(sample_blocks(values)), 98.0))
     moving = np.abs(np.diff(values))
     mask = np.zeros(values.size, np.bool_)
     for start, end in find_true_runs(values == 0.0):
