@@ -204,7 +204,11 @@ def _fit_line(count: FloatArray, changes: Changes) -> tuple[float, float, FloatA
     A change is somewhere between its row and the one before.
     """
     middle = changes.time - 0.5 * changes.width
-    period, start = (float(one) for one in np.polyfit(count, middle, 1, w=1.0 / changes.width))
+    weight = changes.width**-2.0 / np.sum(changes.width**-2.0)
+    from_mean = count - np.sum(weight * count)
+    spread = float(np.sum(weight * from_mean**2))
+    period = float(np.sum(weight * from_mean * middle)) / spread if spread > 0.0 else 0.0
+    start = float(np.sum(weight * (middle - period * count)))
     return start, period, middle - start - period * count
 
 

@@ -104,7 +104,7 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
         time, values = time[usable], values[usable]
     if time.size < 2 * MIN_KNOTS or not is_time_axis(time):
         return None
-    if _is_cycle(values[1:][np.diff(values) != 0.0][:_CYCLE]):
+    if _is_cycle(values[1:][values[1:] != values[:-1]][:_CYCLE]):
         return None
     step = compute_median_step(time)
     lines = _find_lines(time, values)
@@ -140,19 +140,24 @@ def _cut(first: int, end: int, length: int) -> list[slice]:
 
 def _list_liveliest(values: FloatArray, parts: Sequence[slice]) -> list[slice]:
     """List the windows with the most changes, the liveliest first."""
-    changes = [np.count_nonzero(np.diff(values[part])) for part in parts]
+    changes = [np.count_nonzero(values[part][1:] != values[part][:-1]) for part in parts]
     liveliest = np.argsort(-np.asarray(changes), kind="stable")[:_WINDOWS]
     return [parts[k] for k in liveliest if changes[k] >= MIN_KNOTS]
 
 
 def _list_windows(time: FloatArray, values: FloatArray) -> list[slice]:
     """List evenly sampled stretches, the liveliest of a long record first."""
-    step = compute_median_step(time)
-    even = np.abs(np.diff(time) - step) < 0.5 * step
-    runs = find_true_runs(even, 8 * MIN_KNOTS)
+    runs = _find_even_runs(time)
     return _list_liveliest(
         values, [part for first, end in runs for part in _cut(first, end + 1, _WINDOW)]
     )
+
+
+@remember_for_arrays
+def _find_even_runs(time: FloatArray) -> list[tuple[int, int]]:
+    """Return first and last row of each evenly sampled stretch."""
+    step = compute_median_step(time)
+    return find_true_runs(np.abs(np.diff(time) - step) < 0.5 * step, 8 * MIN_KNOTS)
 
 
 def _find_raster(time: FloatArray, values: FloatArray) -> KnotRaster | None:

@@ -47,6 +47,7 @@ def find_uncovered_ends(
     return tuple((low, high) for low, high in ends if high - low > limit)
 
 
+@remember_for_arrays
 def find_pauses(time: FloatArray) -> tuple[tuple[float, float], ...]:
     """Gaps between samples at `time` (n,): from the last sample before to the first one after."""
     wide = np.flatnonzero(np.diff(time) > compute_gap_limit(time))

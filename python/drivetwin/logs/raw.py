@@ -23,7 +23,7 @@ import numpy as np
 from drivetwin._util.arrays import compute_median_step
 from drivetwin.channels.filling import Filling, find_filling
 from drivetwin.channels.read_options import Column, ReadOptions
-from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit
+from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit, find_pauses
 from drivetwin.channels.update_raster import UpdateRaster, find_raster
 from drivetwin.errors import DamagedChannelError, Where
 
@@ -96,8 +96,7 @@ class RawChannel:
     @property
     def pauses(self) -> int:
         """Number of interruptions of the stamps, with or without numbers next to them."""
-        stamps = self.stamps
-        return int(np.count_nonzero(np.diff(stamps) > compute_gap_limit(stamps)))
+        return len(find_pauses(self.stamps))
 
     def select_window(self, window: Window | None) -> RawChannel:
         """Return the samples in a window of time, both ends included; all without a window."""

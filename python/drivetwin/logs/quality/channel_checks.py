@@ -168,10 +168,12 @@ def _check_gaps(channel: Channel) -> list[Finding]:
 
 def _check_limit(channel: Channel) -> list[Finding]:
     """Report an engine torque that rests at its largest number alone; it may be genuine."""
+    if channel.role != "engine_torque":
+        return []
     limit = float(channel.values[np.abs(channel.values).argmax()])
     at_limit = channel.values == limit
     share = float(np.mean(at_limit))
-    if channel.role != "engine_torque" or not MAX_AT_LIMIT < share < 1.0:
+    if not MAX_AT_LIMIT < share < 1.0:
         return []
     rests = find_true_runs(np.diff(channel.values) == 0.0)
     there, elsewhere = (

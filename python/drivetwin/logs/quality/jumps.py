@@ -30,8 +30,10 @@ def find_lost_messages(channel: Channel) -> Damage | None:
     if channel.quantity is not Quantity.SPEED:
         return None
     steep = _find_steep_steps(channel, np.diff(channel.time))
+    if not steep.size:
+        return None
     fresh, since = _measure_delays(channel)
-    usual = np.median(since[np.diff(channel.values) != 0.0]) if steep.size else 0.0
+    usual = np.median(since[np.diff(channel.values) != 0.0])
     known = np.isin(steep, _find_steep_steps(channel, since), invert=True)
     mask = np.zeros(channel.time.size, np.bool_)
     for index in steep[known & (since[steep] > CLOSE * usual)].tolist():
@@ -46,7 +48,9 @@ def check_jumps(channel: Channel, where: Where) -> None:
     """
     if channel.quantity is not Quantity.SPEED:
         return
-    jumps = _find_steep_steps(channel, _measure_delays(channel)[1])
+    jumps = _find_steep_steps(channel, np.diff(channel.time))
+    if jumps.size:
+        jumps = _find_steep_steps(channel, _measure_delays(channel)[1])
     if not jumps.size:
         return
     index = int(jumps[0]) + 1
@@ -65,9 +69,10 @@ def check_jumps(channel: Channel, where: Where) -> None:
 def _find_steep_steps(channel: Channel, pause: FloatArray) -> NDArray[np.intp]:
     """Return the samples after which a speed changes too fast for a `pause` (n-1,) [s]."""
     change = np.abs(np.diff(channel.values))
-    close = np.diff(channel.time) <= CLOSE * channel.step
+    far = np.flatnonzero(change > MAX_JUMP)
+    close = channel.time[far + 1] - channel.time[far] <= CLOSE * channel.step
     fastest = MAX_ACCELERATION if channel.role == "wheel_speed" else OF_A_MOTOR
-    return np.flatnonzero(close & (change > MAX_JUMP) & (change > fastest * pause))
+    return np.asarray(far[close & (change[far] > fastest * pause[far])])
 
 
 def _measure_delays(channel: Channel) -> tuple[NDArray[np.intp], FloatArray]:

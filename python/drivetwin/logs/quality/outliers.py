@@ -189,6 +189,8 @@ def _find_spike_starts(
     inside = inside - 0.5 * (values[before] + values[after])[:, None]
     height = np.abs(inside).min(axis=1, initial=np.inf)
     height[np.abs(np.sign(inside).sum(axis=1)) < width] = 0.0
+    if not before.size:
+        return before
     padded = np.pad(steps, _SURROUNDINGS)
     windows = np.lib.stride_tricks.sliding_window_view(padded, _SURROUNDINGS)
     # Largest step in the windows that end before and start after the spike.
@@ -251,24 +253,25 @@ def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dama
     jumps at the end. Standstill is none, nor a signal without noise that comes to rest or starts
     from rest by itself.
     """
-    steps = np.diff(values)
-    same, moving = steps == 0.0, np.abs(steps)
-    changes = steps.size - int(np.count_nonzero(same))
+    same = values[1:] == values[:-1]
+    changes = same.size - int(np.count_nonzero(same))
     usual = compute_usual_step(values) if changes else np.inf
     long = find_true_runs(same, _STUCK_SAMPLES)
-    outside = steps.size - sum(end - start for start, end in long)
+    outside = same.size - sum(end - start for start, end in long)
     fine = outside >= _ENOUGH and changes > _MOVING * outside
+    least = _STUCK_RELEASE * usual
     mask = np.zeros(values.size, np.bool_)
     for start, end in long:
         if values[start] == 0.0:
             continue
         slow = quantity is Quantity.SPEED and time[end] - time[start] >= _STUCK_TIME
-        released = end < moving.size and moving[end] > _STUCK_RELEASE * usual
-        beside = (steps[max(0, start - _BEFORE) : start], steps[end : end + _BEFORE])
+        released = end < same.size and abs(values[end + 1] - values[end]) > least
+        before, after = values[max(0, start - _BEFORE) : start + 1], values[end:][: _BEFORE + 1]
+        beside = (np.diff(before), np.diff(after))
         noisy = any(_is_noisy(some, usual) for some in beside)
         if (slow and released) or (fine and noisy):
             # The first is the last that was measured, unless the signal jumped to it.
-            jumped = start == 0 or moving[start - 1] > _STUCK_RELEASE * usual
+            jumped = start == 0 or abs(values[start] - values[start - 1]) > least
             mask[start if jumped else start + 1 : end + 1] = True
     return _make_damage(mask, Code.STUCK)
 
@@ -278,17 +281,16 @@ def find_stale(values: FloatArray) -> Damage | None:
 
     Lost messages cause such repeats. Where the signal turns or rests, a repeat may be genuine.
     """
-    steps = np.diff(values)
     mask = np.zeros(values.size, np.bool_)
     if values.size < 4 * _SURROUNDINGS:
         return None
-    size = np.abs(steps)
     least = cache(lambda: _MOVES * max(estimate_resolution(values), _estimate_white_noise(values)))
-    for start, end in find_true_runs(steps == 0.0):
-        if start == 0 or end == steps.size or end - start > _LOST:
+    for start, end in find_true_runs(values[1:] == values[:-1]):
+        if start == 0 or end == values.size - 1 or end - start > _LOST:
             continue
-        before, after, lost = size[start - 1], size[end], end - start
-        onwards = steps[start - 1] * steps[end] > 0.0
+        into, out = values[start] - values[start - 1], values[end + 1] - values[end]
+        before, after, lost = abs(into), abs(out), end - start
+        onwards = into * out > 0.0
         catches_up = before < after < _CATCHES_UP * (lost + 1) * before
         if onwards and catches_up and before + after >= least() * (lost + 2):
             mask[start + 1 : end + 1] = True
@@ -349,18 +351,18 @@ def _estimate_noise(codes: FloatArray) -> float:
 def find_dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches of exact zeros that the signal falls to, and leaves, in one step."""
     level = float(np.percentile(np.abs(sample_blocks(values)), 98.0))
-    moving = np.abs(np.diff(values))
     mask = np.zeros(values.size, np.bool_)
     for start, end in find_true_runs(values == 0.0):
         if start == 0 or end == values.size:
             continue
         least = _DROP * level
         if time[end] - time[start] <= _DROP_TIME:
-            before, after = moving[: start - 1][-_SURROUNDINGS:], moving[end:][:_SURROUNDINGS]
+            before, after = values[:start][-_SURROUNDINGS - 1 :], values[end:][: _SURROUNDINGS + 1]
+            before, after = np.abs(np.diff(before)), np.abs(np.diff(after))
             apart = abs(float(values[end] - values[start - 1]))
             calm = min(before.max(initial=apart), after.max(initial=apart))
             least = min(least, max(_SPIKE_SHARE * level, _SPIKE_CONTRAST * calm))
-        if min(moving[start - 1], moving[end - 1]) > least:
+        if min(abs(values[start - 1]), abs(values[end])) > least:
             mask[start:end] = True
     return _make_damage(mask, Code.DROPOUTS)
 
@@ -424,7 +426,7 @@ def _can_be_fill_pulse(values: FloatArray, run: tuple[int, int], possible: float
 
 def find_clipping(values: FloatArray) -> Damage | None:
     """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
-    same = find_true_runs(np.diff(values) == 0.0, _CLIPPED_SAMPLES - 1)
+    same = find_true_runs(values[1:] == values[:-1], _CLIPPED_SAMPLES - 1)
     for limit in (float(values.max()), float(values.min())):
         at_limit = values == limit
         rests = find_true_runs(at_limit, _CLIPPED_SAMPLES)
