@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import SHORTEST_STEP
+from drivetwin._util.arrays import SHORTEST_STEP, remember_for_arrays
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
 from drivetwin.channels.roles import AUXILIARY, Quantity
@@ -202,7 +202,7 @@ def _check_rest(channel: Channel) -> list[Finding]:
 def _check_rounding(channel: Channel) -> list[Finding]:
     """Report a measured channel that was rounded coarsely."""
     # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
-    numbers = channel.values[np.isfinite(channel.values)]
+    numbers = channel.values
     largest = float(np.abs(numbers).max(initial=0.0))
     if channel.quantity in AUXILIARY or _is_binary(channel.values):
         return []
@@ -300,9 +300,14 @@ def _drop_damage(
 
 def _find_repeated_stamps(time: FloatArray) -> Damage | None:
     """Samples whose stamp repeats the one before, if they are few; more come of a wrong clock."""
-    repeated = np.diff(time, prepend=-np.inf) == 0.0
-    few = np.count_nonzero(repeated) <= MAX_REPEATED * time.size
-    return Damage(repeated, Code.STAMPS_REPEATED) if repeated.any() and few else None
+    if not 0 < _count_repeated_stamps(time) <= MAX_REPEATED * time.size:
+        return None
+    return Damage(np.append(False, time[1:] == time[:-1]), Code.STAMPS_REPEATED)
+
+
+@remember_for_arrays
+def _count_repeated_stamps(time: FloatArray) -> int:
+    return int(np.count_nonzero(time[1:] == time[:-1]))
 
 
 def check_order(time: FloatArray, where: Where) -> None:

@@ -191,10 +191,13 @@ def _find_spike_starts(
     height[np.abs(np.sign(inside).sum(axis=1)) < width] = 0.0
     if not before.size:
         return before
-    padded = np.pad(steps, _SURROUNDINGS)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, _SURROUNDINGS)
     # Largest step in the windows that end before and start after the spike.
-    left, right = windows[before].max(axis=1), windows[after + _SURROUNDINGS].max(axis=1)
+    beside = np.arange(_SURROUNDINGS)
+    left, right = (
+        np.where((rows >= 0) & (rows < steps.size), steps[rows.clip(0, steps.size - 1)], 0.0)
+        for rows in (before[:, None] - 1 - beside, after[:, None] + beside)
+    )
+    left, right = left.max(axis=1), right.max(axis=1)
     around = np.maximum(np.maximum(left, right), apart)
     found = (height > least) & (height > _SPIKE_CONTRAST * around)
     return np.asarray(before[found] + 1)
@@ -377,7 +380,8 @@ def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -
     if compute_median_step(time) > _BEYOND_STEP:
         return None
     size = np.abs(values)
-    if size.max() <= BEYOND * np.median(size):
+    large = np.count_nonzero(BEYOND * size >= size.max())
+    if 2 * large > size.size or size.max() <= BEYOND * np.median(size):
         return None
     sizes = np.unique(size)
     far = np.flatnonzero(sizes[1:] > BEYOND * sizes[:-1])

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from drivetwin._util.arrays import remember_for_arrays
 from drivetwin._util.signal_processing import integrate_trapezoids
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.findings import Code, Finding, Number, report
@@ -162,10 +163,14 @@ def _fit_first(design: FloatArray, target: FloatArray) -> PriorValue | None:
 
 def _compute_block_means(channel: Channel, edges: FloatArray) -> FloatArray:
     """Means (n - 1,) of a channel between `edges` (n,); NaN where a block touches a gap."""
-    total = integrate_trapezoids(channel.values, channel.time)
+    total = _integrate(channel.values, channel.time)
     mean = np.diff(np.interp(edges, channel.time, total)) / np.diff(edges)
     inside = np.isfinite(channel.interpolate(edges))
     return np.where(inside[1:] & inside[:-1], mean, np.nan)
+
+
+_integrate = remember_for_arrays(integrate_trapezoids)
+"""Integral of a channel, which several checks need."""
 
 
 def sample_means(channel: Channel, time: FloatArray) -> FloatArray:
@@ -175,7 +180,7 @@ def sample_means(channel: Channel, time: FloatArray) -> FloatArray:
     """
     start, end = channel.time[0], channel.time[-1]
     edges = np.append(time - 0.5 * GRID, time[-1] + 0.5 * GRID).clip(start, end)
-    total = integrate_trapezoids(channel.values, channel.time)
+    total = _integrate(channel.values, channel.time)
     sums = np.interp(edges, channel.time, total)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.diff(sums) / np.diff(edges)
