@@ -19,7 +19,6 @@ from itertools import product
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import QUANTITIES
@@ -145,6 +144,8 @@ def search_actuator(residuals: Residuals, expected_kiss: float) -> FloatArray:
 
 def _fit_best(residuals: Residuals, starts: Sequence[FloatArray]) -> tuple[FloatArray, float]:
     """Fit from the best of the starts; return the values and their cost."""
+    from scipy.optimize import least_squares
+
     known = residuals.unknowns
     low, high = known.lower / known.size, known.upper / known.size
 

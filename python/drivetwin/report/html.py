@@ -52,8 +52,8 @@ from drivetwin.report.sections.together import (
 
 NOISE_PARTS = 16.0
 SPAN_PARTS = 65536.0
-_COMPRESSION = 5
-"""Level of gzip: the highest takes twice the time for one part in a hundred."""
+_COMPRESSION = 4
+"""Level of gzip: the highest takes twice the time for four parts in a hundred."""
 EVEN = 0.01
 """Largest deviation of a time from an even grid, as a share of its step."""
 

@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from drivetwin.errors import InputError
 from drivetwin.simulation.added_elements import (
@@ -306,6 +305,7 @@ def solve_steady_speed(front: OpenConverter, torque: float, turbine: float) -> f
 
     `turbine` is the speed of the turbine [rad/s].
     """
+    from scipy.optimize import brentq
 
     def surplus(ratio: float) -> float:
         return float(front.converter.compute_pump_torque(turbine / ratio, turbine)) - torque

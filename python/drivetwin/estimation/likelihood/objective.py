@@ -180,12 +180,17 @@ class LikelihoodObjective(Generic[T]):
             if found is None:
                 return None
             residual, slopes = found
-            acting = np.flatnonzero(np.any(slopes != 0.0, axis=0))
-            own = slopes[:, acting]
-            regressor = np.zeros_like(slopes)
+            acting = np.any(slopes, axis=0)
+            is_every = bool(acting.all())
+            columns = np.empty((residual.size, 1 + int(np.count_nonzero(acting))))
+            columns[:, 0] = residual
+            columns[:, 1:] = slopes if is_every else slopes[:, acting]
+            own = columns[:, 1:]
             with np.errstate(over="ignore", invalid="ignore"):
-                weighted = term.weighting.apply_inverse(np.column_stack([residual, own]))
-                regressor[:, acting] = weighted[:, 1:]
+                weighted = term.weighting.apply_inverse(columns)
+                regressor = weighted[:, 1:] if is_every else np.zeros_like(slopes)
+                if not is_every:
+                    regressor[:, acting] = weighted[:, 1:]
                 square = float(residual @ weighted[:, 0])
                 gradient[acting] -= own.T @ weighted[:, 0]
                 data[np.ix_(acting, acting)] += own.T @ weighted[:, 1:]

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh, expm, solve_banded, svd
-from scipy.optimize import least_squares
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
@@ -367,6 +366,8 @@ def fit_ringdown(
     decay shows, or none that stands out of the noise: the best fit to noise alone has an interval
     too, as narrow as any.
     """
+    from scipy.optimize import least_squares
+
     part = _select_ring_samples(torque, lockup, end, after)
     time = np.linspace(part.time[0], part.time[-1], part.time.size)
     values = part.interpolate_at_times(time)

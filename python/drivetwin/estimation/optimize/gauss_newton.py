@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, lsq_linear, minimize
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import notify_progress
@@ -409,6 +408,8 @@ def _combine_subgradients(
     Solves the dual of the minimum of the upper envelope of all pieces: min ‖Σ a·g‖² + Σ a·below
     over the simplex, with the inverse information as metric.
     """
+    from scipy.optimize import Bounds, LinearConstraint, minimize
+
     scale = _compute_scale(information)
     gradients = np.array([piece.gradient for piece in pieces])
     below = np.array([piece.below for piece in pieces])
@@ -462,6 +463,8 @@ def _solve_bounded(
     step = solve_step(information, gradient, damping)
     if np.all((step >= room[0]) & (step <= room[1])):
         return step
+    from scipy.optimize import lsq_linear
+
     scale = _compute_scale(information)
     unit = information / np.outer(scale, scale)
     power, directions = np.linalg.eigh(unit + damping * np.eye(scale.size))

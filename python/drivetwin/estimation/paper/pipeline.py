@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
@@ -108,12 +108,29 @@ def fit_stribeck_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
     for v_s in np.geomspace(max(2.0, float(slip.min())), 100.0, 40):
         fall = np.exp(-slip / v_s)
         basis = np.column_stack([1.0 - fall, fall, slip])
-        found = lsq_linear(basis, mu, ([0.0, 0.0, -np.inf], np.inf), method="bvls")
-        if best is None or found.cost < best[0]:
-            best = (float(found.cost), found.x, float(v_s))
+        values, cost = _fit_nonnegative(basis, mu, 2)
+        if best is None or cost < best[0]:
+            best = (cost, values, float(v_s))
     assert best is not None
     mu_c, mu_s, mu_v = (float(v) for v in best[1])
     return Stribeck(mu_c, mu_s, best[2], mu_v)
+
+
+def _fit_nonnegative(basis: FloatArray, target: FloatArray, count: int) -> tuple[FloatArray, float]:
+    """Fit `basis` (n, p) to `target` (n,) with the first `count` coefficients nonnegative.
+
+    The minimum is that of the least squares without the coefficients that are zero there, so each
+    choice of them is tried. Returns the coefficients (p,) and the sum of squares.
+    """
+    best, least = np.zeros(basis.shape[1]), np.inf
+    for zeros in product((False, True), repeat=count):
+        free = np.append(~np.array(zeros), np.ones(basis.shape[1] - count, np.bool_))
+        values = np.zeros(basis.shape[1])
+        values[free] = np.linalg.lstsq(basis[:, free], target, rcond=None)[0]
+        cost = float(np.sum((target - basis @ values) ** 2))
+        if np.all(values[:count] >= 0.0) and cost < least:
+            best, least = values, cost
+    return best, least
 
 
 def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -> RingDown:

@@ -19,7 +19,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
@@ -169,6 +168,8 @@ def scale_by_evidence(
     of a group is Σ(a² + v - 1) - u/spread² (MacKay, Neural Computation 4, 1992). Stated sensor
     tolerances stay. Returns the scaled sums and u of each group that was scaled.
     """
+    from scipy.optimize import minimize
+
     effects = [one for one in dict.fromkeys(sums.columns.groups) if one.effect is not None]
     if not effects:
         return sums, {}
