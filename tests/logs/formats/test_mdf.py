@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from drivetwin.channels.read_options import Column, ReadOptions, TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingExtraError
+from drivetwin.logs.formats import mdf
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw
@@ -79,6 +80,18 @@ def test_a_window_reads_only_its_records(tmp_path: Path) -> None:
     inside = FAST[(FAST >= 0.5) & (FAST <= 1.0)]
     assert np.array_equal(part.time, inside)
     assert np.array_equal(part.values, inside)
+
+
+def test_records_in_several_pieces_are_those_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mdf, "_FRAGMENT", 1 << 12)
+    signals = [signal(f"x{number}", FAST, number + FAST**2) for number in range(3)]
+    path = save(tmp_path / "log.mf4", [("g", signals)], "4.10")
+    with mdf.open_mdf(path, ReadOptions()) as recording:
+        for number, one in enumerate(signals):
+            assert np.array_equal(recording.load(number).values, one.samples)
+            assert np.array_equal(recording.load(number).time, FAST)
 
 
 def test_samples_marked_invalid_are_left_out_and_told(tmp_path: Path) -> None:

@@ -316,7 +316,8 @@ class _GroupRecords:
         is_kept = self._kept is not None and self._kept[0] == id(group)
         if is_kept or size > _MOST_KEPT or self._read is None or not hasattr(group, "data_blocks"):
             return
-        self._kept = (id(group), list(self._read(group)))
+        # asammdf reuses one buffer for all pieces unless a number of records is asked for.
+        self._kept = (id(group), list(self._read(group, 0, int(block.cycles_nr))))
         self._reader._load_data = self._load
 
     def _load(
