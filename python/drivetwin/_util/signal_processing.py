@@ -63,16 +63,23 @@ def find_true_runs(mask: NDArray[np.bool_], least: int = 1) -> list[tuple[int, i
 
     Runs of fewer than `least` samples are left out.
     """
-    if not mask.size:
-        return []
-    starts = np.flatnonzero(mask[1:] & ~mask[:-1]) + 1
-    ends = np.flatnonzero(mask[:-1] & ~mask[1:]) + 1
-    starts = np.concatenate(([0], starts)) if mask[0] else starts
-    ends = np.concatenate((ends, [mask.size])) if mask[-1] else ends
+    starts, ends = find_run_bounds(mask)
     if least > 1:
         long = ends - starts >= least
         starts, ends = starts[long], ends[long]
     return list(zip(starts.tolist(), ends.tolist(), strict=True))
+
+
+def find_run_bounds(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return first indices (m,) and ends (m,), one past the last, of the runs of True in `mask`
+    (n,)."""
+    if not mask.size:
+        return np.empty(0, np.intp), np.empty(0, np.intp)
+    starts = np.flatnonzero(mask[1:] & ~mask[:-1]) + 1
+    ends = np.flatnonzero(mask[:-1] & ~mask[1:]) + 1
+    starts = np.concatenate(([0], starts)) if mask[0] else starts
+    ends = np.concatenate((ends, [mask.size])) if mask[-1] else ends
+    return starts, ends
 
 
 def estimate_resolution(values: FloatArray) -> float:

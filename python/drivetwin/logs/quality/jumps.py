@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.arrays import remember_for_arrays
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
@@ -68,11 +69,18 @@ def check_jumps(channel: Channel, where: Where) -> None:
 
 def _find_steep_steps(channel: Channel, pause: FloatArray) -> NDArray[np.intp]:
     """Return the samples after which a speed changes too fast for a `pause` (n-1,) [s]."""
-    change = np.abs(np.diff(channel.values))
-    far = np.flatnonzero(change > MAX_JUMP)
+    far, change = _find_far_steps(channel.values)
     close = channel.time[far + 1] - channel.time[far] <= CLOSE * channel.step
     fastest = MAX_ACCELERATION if channel.role == "wheel_speed" else OF_A_MOTOR
-    return np.asarray(far[close & (change[far] > fastest * pause[far])])
+    return np.asarray(far[close & (change > fastest * pause[far])])
+
+
+@remember_for_arrays
+def _find_far_steps(values: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the samples after which a speed jumps, and the sizes of the jumps."""
+    change = np.abs(np.diff(values))
+    far = np.flatnonzero(change > MAX_JUMP)
+    return far, change[far]
 
 
 def _measure_delays(channel: Channel) -> tuple[NDArray[np.intp], FloatArray]:

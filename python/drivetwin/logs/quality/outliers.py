@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.special import erf
 from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.signal_processing import (
     estimate_resolution,
+    find_run_bounds,
     find_true_runs,
     sample_blocks,
 )
@@ -284,19 +284,22 @@ def find_stale(values: FloatArray) -> Damage | None:
 
     Lost messages cause such repeats. Where the signal turns or rests, a repeat may be genuine.
     """
-    mask = np.zeros(values.size, np.bool_)
     if values.size < 4 * _SURROUNDINGS:
         return None
-    least = cache(lambda: _MOVES * max(estimate_resolution(values), _estimate_white_noise(values)))
-    for start, end in find_true_runs(values[1:] == values[:-1]):
-        if start == 0 or end == values.size - 1 or end - start > _LOST:
-            continue
-        into, out = values[start] - values[start - 1], values[end + 1] - values[end]
-        before, after, lost = abs(into), abs(out), end - start
-        onwards = into * out > 0.0
-        catches_up = before < after < _CATCHES_UP * (lost + 1) * before
-        if onwards and catches_up and before + after >= least() * (lost + 2):
-            mask[start + 1 : end + 1] = True
+    starts, ends = find_run_bounds(values[1:] == values[:-1])
+    inner = (starts > 0) & (ends < values.size - 1) & (ends - starts <= _LOST)
+    starts, ends = starts[inner], ends[inner]
+    into, out = values[starts] - values[starts - 1], values[ends + 1] - values[ends]
+    before, after, lost = np.abs(into), np.abs(out), ends - starts
+    onwards = into * out > 0.0
+    catches_up = (before < after) & (after < _CATCHES_UP * (lost + 1) * before)
+    moved = (before + after) / (lost + 2) / _MOVES
+    found = onwards & catches_up & (moved >= _estimate_white_noise(values))
+    if found.any():  # the resolution takes longer than the noise
+        found &= moved >= estimate_resolution(values)
+    mask = np.zeros(values.size, np.bool_)
+    for start, end in zip(starts[found].tolist(), ends[found].tolist(), strict=True):
+        mask[start + 1 : end + 1] = True
     return _make_damage(mask, Code.MESSAGES_LOST)
 
 
