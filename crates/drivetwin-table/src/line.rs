@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Fields of one line.
 
+use crate::number::{Number, parse_number, parse_plain_number};
 use std::ops::Range;
 
 /// Separator of the fields of a line.
@@ -19,28 +20,44 @@ pub struct Fields {
     unquoted: Vec<u8>,
     is_quoted: bool,
     ranges: Vec<Range<usize>>,
+    /// Number of each field that is one.
+    numbers: Vec<Option<Number>>,
 }
 
 impl Fields {
     /// Split a line; an error describes a quoted field that does not end where it should.
     pub fn split(&mut self, line: &[u8], separator: Separator) -> Result<(), &'static str> {
         self.ranges.clear();
+        self.numbers.clear();
         self.is_quoted = false;
         match separator {
             Separator::Blanks => self.split_at_blanks(line),
             Separator::Byte(byte) if line.contains(&b'"') => self.split_quoted(line, byte)?,
             Separator::Byte(byte) => {
-                let mut start = 0;
-                for (at, &one) in line.iter().enumerate() {
-                    if one == byte {
-                        self.ranges.push(trim_range(line, start, at));
-                        start = at + 1;
-                    }
-                }
-                self.ranges.push(trim_range(line, start, line.len()));
+                self.split_plain(line, byte);
+                return Ok(());
             }
         }
+        let text = if self.is_quoted { &self.unquoted } else { line };
+        self.numbers.extend(self.ranges.iter().map(|range| parse_number(&text[range.clone()])));
         Ok(())
+    }
+
+    /// Split a line without quotes and parse its numbers in one pass.
+    fn split_plain(&mut self, line: &[u8], separator: u8) {
+        let mut start = 0;
+        loop {
+            let plain = parse_plain_number(line, start, separator);
+            let end = plain.map_or_else(|| find_end(line, start, separator), |(_, end)| end);
+            let range = if plain.is_some() { start..end } else { trim_range(line, start, end) };
+            let number = plain.map(|(number, _)| number);
+            self.numbers.push(number.or_else(|| parse_number(&line[range.clone()])));
+            self.ranges.push(range);
+            if end == line.len() {
+                return;
+            }
+            start = end + 1;
+        }
     }
 
     fn split_at_blanks(&mut self, line: &[u8]) {
@@ -103,6 +120,11 @@ impl Fields {
         self.ranges.len()
     }
 
+    /// Number of each field; `None` for other texts.
+    pub fn numbers(&self) -> &[Option<Number>] {
+        &self.numbers
+    }
+
     /// The field at `index` of the `line` that was split; empty beyond the last.
     pub fn get<'a>(&'a self, line: &'a [u8], index: usize) -> &'a [u8] {
         let text = if self.is_quoted { &self.unquoted } else { line };
@@ -113,6 +135,11 @@ impl Fields {
     pub fn iter<'a>(&'a self, line: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
         (0..self.len()).map(move |index| self.get(line, index))
     }
+}
+
+/// End of the field from `start` on.
+fn find_end(line: &[u8], start: usize, separator: u8) -> usize {
+    line[start..].iter().position(|&byte| byte == separator).map_or(line.len(), |at| start + at)
 }
 
 fn trim_range(text: &[u8], start: usize, end: usize) -> Range<usize> {

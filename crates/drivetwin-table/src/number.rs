@@ -66,6 +66,39 @@ pub fn parse_number(cell: &[u8]) -> Option<Number> {
     Some(Number { value: if negative { -size } else { size }, sign })
 }
 
+/// Parse digits with a decimal point or comma from `start` on, up to the `separator` or the end of a line, and
+/// return the number and its end; `None` for all other cells.
+pub fn parse_plain_number(line: &[u8], start: usize, separator: u8) -> Option<(Number, usize)> {
+    let mut at = start + usize::from(line.get(start) == Some(&b'-'));
+    let (first, mut fraction) = (at, None);
+    let mut mantissa = 0_u64;
+    while let Some(&byte) = line.get(at) {
+        if byte.is_ascii_digit() {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
+        } else if byte == separator {
+            break;
+        } else if matches!(byte, b'.' | b',') && fraction.is_none() {
+            fraction = Some((at, byte));
+        } else {
+            return None;
+        }
+        at += 1;
+    }
+    let signs = usize::from(fraction.is_some());
+    // So many digits are below 2^53.
+    if !(1..=15).contains(&(at - first - signs)) {
+        return None;
+    }
+    let decimals = fraction.map_or(0, |(place, _)| at - place - 1);
+    let size = mantissa as f64 / EXACT_POWERS[decimals];
+    let sign = match fraction {
+        None => DecimalSign::None,
+        Some((_, b'.')) => DecimalSign::Point,
+        Some(_) => DecimalSign::Comma,
+    };
+    Some((Number { value: if first > start { -size } else { size }, sign }, at))
+}
+
 /// Return the exponent after the digits, zero without one; `None` for any other text.
 fn parse_exponent(rest: &[u8]) -> Option<i32> {
     let Some((first, power)) = rest.split_first() else {
@@ -132,6 +165,17 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn plain_numbers_are_those_of_their_cells(
+            cell in "[+-]?[0-9]{0,17}[.,]?[0-9]{0,17}(e[0-9])?", rest in "(;[0-9]{0,3})?"
+        ) {
+            let line = format!("1;{cell}{rest}");
+            if let Some((number, end)) = parse_plain_number(line.as_bytes(), 2, b';') {
+                prop_assert_eq!(end, 2 + cell.len());
+                prop_assert_eq!(Some(number), parse_number(cell.as_bytes()));
+            }
+        }
+
         #[test]
         fn rounding_is_that_of_the_standard_library(
             text in "[+-]?([0-9]{1,25}[.]?[0-9]{0,25}|[.][0-9]{1,20})([eE][+-]?[0-9]{1,3})?"

@@ -3,7 +3,7 @@
 
 use crate::column::{Column, Text};
 use crate::line::{Fields, Separator, trim};
-use crate::number::{DecimalSign, Number, parse_number};
+use crate::number::DecimalSign;
 
 /// Lines that are no rows, of which the text is kept.
 const MOST_REMARKS: usize = 1000;
@@ -77,7 +77,6 @@ pub struct Scanner {
     position: usize,
     line: usize,
     fields: Fields,
-    parsed: Vec<Option<Number>>,
     table: Table,
 }
 
@@ -99,7 +98,6 @@ impl Scanner {
             position: 0,
             line: 0,
             fields: Fields::default(),
-            parsed: Vec::with_capacity(layout.width),
             layout,
             table,
         }
@@ -149,9 +147,7 @@ impl Scanner {
             }
             return;
         }
-        self.parsed.clear();
-        self.parsed.extend(self.fields.iter(line).take(self.layout.width).map(parse_number));
-        let has_numbers = self.parsed.iter().any(Option::is_some);
+        let has_numbers = self.fields.numbers().iter().take(self.layout.width).any(Option::is_some);
         let mut surplus = self.layout.width..self.fields.len();
         let fits = self.fields.len() >= self.layout.least
             && surplus.all(|index| self.fields.get(line, index).is_empty());
@@ -198,10 +194,13 @@ impl Scanner {
         }
         table.rows += 1;
         for (index, column) in table.columns.iter_mut().enumerate() {
-            match self.parsed.get(index).copied().flatten() {
+            match self.fields.numbers().get(index).copied().flatten() {
                 Some(number) => {
                     column.push_number(number.value);
-                    table.decimals[index].add(number.sign, self.fields.get(line, index));
+                    let decimals = &mut table.decimals[index];
+                    if !decimals.has_example(number.sign) {
+                        decimals.add(number.sign, self.fields.get(line, index));
+                    }
                 }
                 None => column.push_text(self.fields.get(line, index), self.line),
             }
@@ -214,6 +213,15 @@ impl Scanner {
 }
 
 impl Decimals {
+    /// Return true if no further number with this sign adds anything.
+    fn has_example(&self, sign: DecimalSign) -> bool {
+        match sign {
+            DecimalSign::None => self.whole.is_some(),
+            DecimalSign::Point => self.point.is_some(),
+            DecimalSign::Comma => self.has_decimal_comma && self.comma.is_some(),
+        }
+    }
+
     fn add(&mut self, sign: DecimalSign, cell: &[u8]) {
         let first = match sign {
             DecimalSign::None => &mut self.whole,
@@ -259,12 +267,33 @@ fn is_text(cell: &[u8]) -> bool {
 
 /// End of the line from `start` and start of the next one; `None` if the text may go on.
 fn find_line_end(text: &[u8], start: usize) -> Option<(usize, usize)> {
-    let at = start + text[start..].iter().position(|byte| matches!(byte, b'\n' | b'\r'))?;
+    let at = start + find_break(&text[start..])?;
     match (text[at], text.get(at + 1)) {
         (b'\r', None) => None,
         (b'\r', Some(b'\n')) => Some((at, at + 2)),
         _ => Some((at, at + 1)),
     }
+}
+
+/// Place of the first line feed or carriage return, eight bytes at a time.
+fn find_break(text: &[u8]) -> Option<usize> {
+    const ONES: u64 = u64::MAX / 255;
+    // Bit 7 of the lowest byte that equals `byte`, and of none below it.
+    let find = |word: u64, byte: u8| {
+        let differs = word ^ (ONES * u64::from(byte));
+        differs.wrapping_sub(ONES) & !differs & (ONES << 7)
+    };
+    let mut words = text.chunks_exact(8);
+    let full = text.len() - text.len() % 8;
+    for (number, chunk) in words.by_ref().enumerate() {
+        let word = u64::from_le_bytes(chunk.try_into().expect("eight bytes"));
+        let found = find(word, b'\n') | find(word, b'\r');
+        if found != 0 {
+            return Some(8 * number + found.trailing_zeros() as usize / 8);
+        }
+    }
+    let rest = words.remainder().iter().position(|byte| matches!(byte, b'\n' | b'\r'))?;
+    Some(full + rest)
 }
 
 #[cfg(test)]
