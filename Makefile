@@ -69,6 +69,8 @@ test-rust: $(venv)/.dev ## tests of the core
 	cargo test --locked --quiet --package drivetwin-core --package drivetwin-table
 
 .PHONY: test-python
+hypothesis_examples ?= 40
+test-python: export HYPOTHESIS_EXAMPLES := $(hypothesis_examples)
 test-python: $(venv)/.dev native ## tests of the package, without the suites that take long
 	$(pytest) --durations 50 --durations-min 2
 
@@ -81,8 +83,8 @@ test-short: $(venv)/.dev native ## one short case of each suite that takes long
 test-statistical: ## coverage of intervals over many noise realisations
 test-crosscompile: ## libraries and FMUs for other platforms
 test-faults: ## killed workers and coordinators, a full disk, a lost scheduler (fault_logs=1000 logs each)
-test-exhaustive: ## thousands of damaged files through each reader
-test-howto: ## commands of the how-to pages that identify, and of the tutorials
+test-exhaustive: ## thousands of damaged files through each reader, repeats of everyday cases
+test-howto: ## commands of the how-to pages that identify, of the tutorials and notebooks
 fault_logs ?= 40
 test-faults: export FLEET_FAULT_LOGS := $(fault_logs)
 $(suites:%=test-%): test-%: $(venv)/.dev native
@@ -98,8 +100,9 @@ golden: $(venv)/.dev native ## compare 72 identifications with stored results (f
 	$(bin)/python -m tests.golden
 
 .PHONY: nightly
-nightly: ## what takes hours: all suites, a fleet of 300, the wheel, short fuzzing of `identify`
+nightly: ## what takes hours: all suites, property tests at length, a fleet of 300, the wheel, short fuzzing of `identify`
 	$(MAKE) $(suites:%=test-%) fault_logs=1000
+	$(MAKE) test-python hypothesis_examples=400
 	$(MAKE) fleet fleet_logs=300
 	$(MAKE) golden test-browser test-wheel test-reproducible docs deny
 

@@ -28,12 +28,14 @@ from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import Column
 from drivetwin.vehicle.card import load_card
 from tests.plausibility.fixtures import Synthetic, make_log
+from tests.support.repeats import mark_repeats
 
 SCENARIOS = ("paper_steps", "gearbox_chain", "dual_clutch", "manual", "power_off_down")
+DAILY = ("paper_steps", "gearbox_chain", "manual")
 LOGS = Path(__file__).resolve().parents[3] / "shared" / "logs"
 
 
-@pytest.fixture(scope="module", params=SCENARIOS)
+@pytest.fixture(scope="module", params=mark_repeats(SCENARIOS, DAILY))
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Synthetic:
     return make_log(request.param, tmp_path_factory.mktemp("survey"))
 

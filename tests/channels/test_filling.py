@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -15,9 +17,12 @@ from drivetwin.channels.line_corners import estimate_resolution
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
 from drivetwin.logs.read import read_raw
 from tests.shifts.fixtures import shared
+from tests.support.repeats import mark_repeats
 
 STEP = 1e-3
 NOISE = 0.3
+FACTORS = (2, 3, 10, 20, 7.5)
+KINDS = ("linear", "spline", "pchip", "makima")
 
 
 def measure_speed(time: FloatArray, seed: int, noise: float = NOISE) -> FloatArray:
@@ -58,11 +63,13 @@ def check_filling(
     assert np.std((found.values - truth)[inner]) < max(0.7 * 10.0**-decimals, 0.02 * NOISE)
 
 
-@pytest.mark.parametrize("factor", [2, 3, 10, 20, 7.5])
-@pytest.mark.parametrize("kind", ["linear", "spline", "pchip", "makima"])
-def test_finds_the_measured_samples(factor: float, kind: str) -> None:
+@pytest.mark.parametrize(
+    "filled",
+    mark_repeats(product(FACTORS, KINDS), [*product(FACTORS, ["linear"]), *product([10], KINDS)]),
+)
+def test_finds_the_measured_samples(filled: tuple[float, str]) -> None:
     """Any ratio of rates, also one that does not divide."""
-    check_filling(factor, kind)
+    check_filling(*filled)
 
 
 @pytest.mark.parametrize("kind", ["linear", "spline", "pchip"])
@@ -79,7 +86,7 @@ def test_finds_linear_knots_anywhere(factor: float, phase: float) -> None:
     check_filling(factor, "linear", phase=phase, seed=1)
 
 
-@pytest.mark.parametrize("digits", [5, 7, 9])
+@pytest.mark.parametrize("digits", mark_repeats([5, 7, 9], [5]))
 def test_a_text_of_significant_digits_is_no_filling(digits: int) -> None:
     """A simulation writes a smooth speed that starts at rest, so that its last decimal varies."""
     time = np.arange(0.0, 30.0, 1e-2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,6 @@ import pytest
 
 from drivetwin.calibration.calibrate import polish_from
 from drivetwin.calibration.metrics import list_outputs
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
@@ -23,7 +21,6 @@ from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_file import save_twin
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from drivetwin.simulation.network import simulate
-from tests.calibration.cases import QUICK
 from tests.calibration.twins import (
     ADDED_ELEMENTS,
     assemble,
@@ -43,12 +40,7 @@ FILES = {
 SHORT = ("--draws", "60", "--engine-torque", "1400")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def effort() -> Iterator[None]:
-    """Few candidates and draws in all tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(CalibrationSettings, "for_policy", lambda _: QUICK)
-        yield
+pytestmark = pytest.mark.usefixtures("quick_search")
 
 
 @pytest.fixture(scope="module")

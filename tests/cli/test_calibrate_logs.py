@@ -4,28 +4,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.cli import main
 from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.twin.twin import build_nominal_shift
 from tests.calibration.bench import write_bench_log
-from tests.calibration.cases import QUICK
 from tests.calibration.twins import make_twin
 
-
-@pytest.fixture(scope="module", autouse=True)
-def effort() -> Iterator[None]:
-    """Few candidates and draws in all tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(CalibrationSettings, "for_policy", lambda _: QUICK)
-        yield
+pytestmark = pytest.mark.usefixtures("quick_search")
 
 
 def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(

@@ -14,7 +14,9 @@ from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_file import save_twin
 from tests.calibration.twins import make_hydraulic_twin
 
-SHORT = ("--draws", "60", "--engine-torque", "1400", "--effort", "0.05")
+SHORT = ("--draws", "60", "--engine-torque", "1400")
+
+pytestmark = pytest.mark.usefixtures("quick_search")
 
 
 @pytest.fixture

@@ -10,12 +10,12 @@ import pytest
 
 from drivetwin.cli import main
 from tests.cli.conftest import Files
-from tests.plausibility.fixtures import Synthetic, make_log
+from tests.plausibility.fixtures import Synthetic
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Synthetic:
-    return make_log("dual_clutch", tmp_path_factory.mktemp("card"))
+def made(bench_files: Files) -> Synthetic:
+    return Synthetic(bench_files.log, bench_files.card)
 
 
 def write_wrong(made: Synthetic, folder: Path, old: str, new: str) -> str:
@@ -34,9 +34,9 @@ def test_correct_card_has_no_finding(made: Synthetic, capsys: pytest.CaptureFixt
 def test_wrong_entry_is_named(
     made: Synthetic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    wrong = write_wrong(made, tmp_path, "gain_m3 = 0.0065", "gain_m3 = 0.65")
+    wrong = write_wrong(made, tmp_path, "gain_m3 = 0.027", "gain_m3 = 2.7")
     assert main(["card", "check", wrong]) == 0
-    assert "elements.K1.gain_m3" in capsys.readouterr().out
+    assert "elements.B3.gain_m3" in capsys.readouterr().out
     assert main(["card", "check", wrong, str(made.log), "--strict"]) == 3
     assert "wet clutch" in " ".join(capsys.readouterr().out.split())
 
@@ -44,8 +44,7 @@ def test_wrong_entry_is_named(
 def test_findings_as_json(
     made: Synthetic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    wrong = write_wrong(made, tmp_path, "ratio = 1.53", "ratio = 1.0")
-    wrong = write_wrong(Synthetic(made.log, Path(wrong)), tmp_path, "i_out = 1.53", "i_out = 1.0")
+    wrong = write_wrong(made, tmp_path, "ratio = 1.43", "ratio = 1.2")
     assert main(["card", "check", wrong, str(made.log), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     codes = {one["code"] for one in document["findings"]}
@@ -58,7 +57,7 @@ def test_unusable_log_is_refused_after_the_findings(
 ) -> None:
     empty = tmp_path / "empty.csv"
     empty.touch()
-    wrong = write_wrong(made, tmp_path, "P0_bar = 0.5", "P0_bar = 50000.0")
+    wrong = write_wrong(made, tmp_path, "P0_bar = 0.8", "P0_bar = 80000.0")
     assert main(["card", "check", wrong, str(empty)]) == 2
     shown = capsys.readouterr()
     assert "P0_bar" in shown.out
@@ -68,8 +67,7 @@ def test_unusable_log_is_refused_after_the_findings(
 def test_identify_shows_findings_before_it_refuses(
     made: Synthetic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    wrong = write_wrong(made, tmp_path, "ratio = 1.53", "ratio = 1.0")
-    wrong = write_wrong(Synthetic(made.log, Path(wrong)), tmp_path, "i_out = 1.53", "i_out = 1.0")
+    wrong = write_wrong(made, tmp_path, "ratio = 1.43", "ratio = 1.2")
     assert main(["identify", str(made.log), "--vehicle", wrong]) == 2
     errors = capsys.readouterr().err
     assert (
@@ -98,14 +96,11 @@ def test_mapping_beside_the_log_is_used_without_an_option(
 
 
 def test_each_ratio_has_one_finding_with_both_intervals(
-    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    made: Synthetic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    bench = Synthetic(bench_files.log, bench_files.card)
-    wrong = write_wrong(bench, tmp_path, "final_drive = 5.38", "final_drive = 5.43")
-    wrong = write_wrong(
-        Synthetic(bench.log, Path(wrong)), tmp_path, "ratio = 1.43", "ratio = 1.436"
-    )
-    files = [wrong, str(bench.log)]
+    wrong = write_wrong(made, tmp_path, "final_drive = 5.38", "final_drive = 5.43")
+    wrong = write_wrong(Synthetic(made.log, Path(wrong)), tmp_path, "ratio = 1.43", "ratio = 1.436")
+    files = [wrong, str(made.log)]
     assert main(["card", "check", *files, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["findings"]
     ratios = {"gears[0].ratio", "gears[1].ratio", "final_drive"}
@@ -125,10 +120,9 @@ def test_each_ratio_has_one_finding_with_both_intervals(
 
 
 def test_the_count_of_the_check_contains_the_remarks(
-    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    made: Synthetic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    bench = Synthetic(bench_files.log, bench_files.card)
-    rough = write_wrong(bench, tmp_path, "ratio = 1.91", "ratio = 1.9")
-    rough = write_wrong(Synthetic(bench.log, Path(rough)), tmp_path, "= 5.38", "= 5.4")
-    assert main(["card", "check", rough, str(bench.log), "--strict"]) == 0
+    rough = write_wrong(made, tmp_path, "ratio = 1.91", "ratio = 1.9")
+    rough = write_wrong(Synthetic(made.log, Path(rough)), tmp_path, "= 5.38", "= 5.4")
+    assert main(["card", "check", rough, str(made.log), "--strict"]) == 0
     assert capsys.readouterr().out.rstrip().endswith("nothing implausible, 2 remarks above")

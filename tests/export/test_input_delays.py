@@ -26,6 +26,7 @@ from tests.export.cases import CASES, STEP, Case
 from tests.export.fmu.test_build import Instance
 from tests.export.modelica.compiled import run as run_modelica
 from tests.export.parameters.sample import twin
+from tests.support.repeats import mark_repeats
 
 OLD_TORQUE = InputDelays(0.0213, 0.0, as_logged=True, held=0.01)
 EARLY_PRESSURE = InputDelays(0.004, -0.0092, as_logged=True)
@@ -111,7 +112,7 @@ def test_c_delays_its_inputs(delays: InputDelays) -> None:
         assert deviation < tolerance * scale, time.size
 
 
-@pytest.mark.parametrize("delays", ALL)
+@pytest.mark.parametrize("delays", mark_repeats(ALL, ALL[-1:]))
 @pytest.mark.parametrize("kind", InputKind)
 def test_c_and_core_have_the_same_delay_lines(delays: InputDelays, kind: InputKind) -> None:
     case = _swing("tie_up")

@@ -17,7 +17,7 @@ from tests.fleet.toys import contents, make_logs, names, run_toys
 
 def test_every_log_is_settled_once_and_never_computed_again(tmp_path: Path) -> None:
     logs, store = make_logs(tmp_path / "logs", 9, spoilt=["bad"]), tmp_path / "store"
-    summary, events = run_toys(logs, store)
+    summary, events = run_toys(logs, store, workers=2)
     assert (summary.files, summary.done, summary.bad, summary.computed) == (9, 8, 1, 9)
     assert isinstance(events[0], Started)
     assert isinstance(events[-1], Summary)
@@ -71,7 +71,7 @@ def test_equal_content_is_one_log_and_every_file_is_named(tmp_path: Path) -> Non
 def test_what_hangs_eats_or_kills_is_quarantined_with_its_reason(tmp_path: Path) -> None:
     spoilt = ["hang", "eat", "die"]
     logs, store = make_logs(tmp_path / "logs", 8, spoilt=spoilt), tmp_path / "store"
-    summary, events = run_toys(logs, store, time_limit=2.0, attempts=2)
+    summary, events = run_toys(logs, store, time_limit=2.0, attempts=2, workers=2)
     assert (summary.done, summary.quarantined) == (5, 3)
     assert summary.failures == {"TimeLimit": 1, "MemoryLimit": 1, "WorkerLost": 1}
     for number, error in enumerate(("TimeLimit", "MemoryLimit", "WorkerLost")):

@@ -25,6 +25,7 @@ from drivetwin.fleet.coordinator import run_fleet
 from drivetwin.fleet.events import Event, Settled
 from drivetwin.fleet.store import Store
 from tests.fleet.toys import ROOT, contents, make_logs, request, run_toys
+from tests.support.repeats import mark_repeats
 
 COUNT = int(os.environ.get("FLEET_FAULT_LOGS", "30"))
 
@@ -66,7 +67,7 @@ def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
             killed.append(dice.choice(workers))
             os.kill(killed[-1], signal.SIGKILL)
 
-    asked = request(logs, tmp_path / "store", attempts=50)
+    asked = request(logs, tmp_path / "store", attempts=50, workers=2)
     summary = run_fleet(asked, kill_now_and_then)
     assert len(killed) >= 3
     assert (summary.done, summary.bad) == (COUNT - 1, 1)
@@ -156,7 +157,9 @@ def test_two_coordinators_do_not_share_a_store(tmp_path: Path) -> None:
     assert contents(store) == undisturbed(logs, tmp_path / "calm")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number", mark_repeats([signal.SIGTERM, signal.SIGINT], [signal.SIGTERM], pytest.mark.faults)
+)
 def test_a_signal_ends_a_run_in_two_seconds(tmp_path: Path, number: int) -> None:
     logs = make_logs(tmp_path / "logs", 12, word="slow", spoilt=["", "", "", "hang"])
     store = tmp_path / "store"
@@ -185,7 +188,7 @@ def test_an_interrupted_run_tells_what_it_did_and_goes_on(tmp_path: Path) -> Non
             raise KeyboardInterrupt
 
     events: list[Event] = []
-    summary = run_fleet(request(logs, store), interrupt)
+    summary = run_fleet(request(logs, store, workers=2), interrupt)
     assert not summary.complete
     assert 0 < len(contents(store)["rows"]) < 12
     assert run_toys(logs, store)[0].complete

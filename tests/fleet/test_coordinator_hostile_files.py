@@ -68,7 +68,7 @@ def test_a_device_of_a_list_is_a_bad_log(tmp_path: Path) -> None:
 @pytest.mark.parametrize("count", [200, pytest.param(3000, marks=pytest.mark.faults)])
 def test_many_tiny_logs_and_one_from_the_past(tmp_path: Path, count: int) -> None:
     logs = make_logs(tmp_path / "logs", count)
-    assert run_toys(logs, tmp_path / "store")[0].computed == count
+    assert run_toys(logs, tmp_path / "store", workers=2)[0].computed == count
     changed = logs / "unit_0" / "log_0000.csv"
     changed.write_text("changed\n")
     os.utime(changed, (1e9, 1e9))  # years before it was scanned

@@ -44,7 +44,7 @@ def request(logs: Path, store: Path, **changes: Any) -> FleetRun:
         "function": "tests.fleet.work:toy",
         "time_limit": LIMITS.seconds,
         "memory_limit": LIMITS.memory,
-        "workers": 2,
+        "workers": 1,  # its start takes most of the time; tests of the pool ask for two
         "method": Method.PAPER,
         **changes,
     }
@@ -81,5 +81,7 @@ def _tell(event: Event) -> None:
 if __name__ == "__main__":
     interrupt_on_signals()
     scheduler = sys.argv[3] if len(sys.argv) > 3 else None
-    asked = request(Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, attempts=20)
+    asked = request(
+        Path(sys.argv[1]), Path(sys.argv[2]), scheduler=scheduler, attempts=20, workers=2
+    )
     run_fleet(asked, _tell)

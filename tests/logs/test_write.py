@@ -18,6 +18,7 @@ from drivetwin.logs.read import read_log, read_raw
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.vehicle.card import load_card
 from tests.logs.fixtures import card, columns, write
+from tests.support.repeats import mark_repeats
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared"
@@ -95,7 +96,7 @@ def test_a_channel_in_a_unit_that_is_unknown_is_not_written_in_another() -> None
         convert_to_recorded_units(channel)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", mark_repeats(SUFFIXES, SUFFIXES[:2]))
 def test_a_recorded_log_is_the_same_in_every_format(tmp_path: Path, suffix: str) -> None:
     source = SHARED / "logs" / "truck_b.mf4"
     if not source.exists():

@@ -18,6 +18,7 @@ from drivetwin.plausibility.check import check_card, select_card_findings
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 from tests.plausibility.fixtures import CORRECT, Synthetic, make_log
+from tests.support.repeats import mark_repeats
 
 Change = Callable[[dict[str, Any]], None]
 
@@ -107,6 +108,9 @@ SLIPS = (
 )
 
 
+DAILY = ("gearbox_chain", "open_converter", "paper", "power_off_down")
+
+
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory: pytest.TempPathFactory) -> Synthetic:
     return make_log("paper_steps", tmp_path_factory.mktemp("paper"))
@@ -151,7 +155,7 @@ def test_only_the_wrong_entry_is_reported(paper: Synthetic, tmp_path: Path) -> N
         assert [one.place.key for one in check_file(card, paper.log)] == [slip.key]
 
 
-@pytest.mark.parametrize("scenario", CORRECT)
+@pytest.mark.parametrize("scenario", mark_repeats(CORRECT, DAILY))
 def test_nothing_is_reported_on_a_correct_card(scenario: str, tmp_path: Path) -> None:
     made = make_log(scenario, tmp_path)
     assert check_file(made.card, made.log) == ()

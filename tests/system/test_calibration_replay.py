@@ -29,6 +29,7 @@ from tests.calibration.cases import (
     make_plant,
     make_slip_policy,
 )
+from tests.support.repeats import mark_repeats
 from tests.support.upshift.closed_loop import Controlled, Given, Valve, solve_tasks
 from tests.support.upshift.scenario import build_model
 from tests.support.upshift.statement import Inputs, Problem, make_problem
@@ -121,7 +122,7 @@ def simulate(case: Case, control: Control, of: Problem) -> Outcome:
     return make_plant(case.shift).evaluate(control, Scenarios(drawn.sets, 1, units))
 
 
-@pytest.mark.parametrize("name", list(CASES))
+@pytest.mark.parametrize("name", mark_repeats(CASES, ("upshift by a slip loop", "downshift")))
 def test_a_calibration_has_the_metrics_of_another_simulator(name: str) -> None:
     case = CASES[name]
     calibrated = calibrate(build_task(case))

@@ -110,3 +110,11 @@ def test_effects_without_a_value_of_their_own_are_named() -> None:
     (sentence,) = re.findall(r"State no `value` for ([^:]*):", page)
     named = set(re.findall(r"`(\w+)`", sentence))
     assert named == {one.id for one in EFFECTS.values() if one.random}
+
+
+def test_every_test_of_the_lists_exists() -> None:
+    text = (ROOT / "tests" / "README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `([\w/]+\.py)::(\w+)` \|", text, re.MULTILINE)
+    assert len(listed) > 50
+    for path, name in listed:
+        assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8"), (path, name)

@@ -12,7 +12,7 @@ from tests.fuzz.mutate import mutate
 from tests.fuzz.run import outcome
 from tests.fuzz.seeds import CRASHING, SEEDS
 
-FEW, MANY = 20, 2000
+FEW, MANY = 5, 2000
 
 
 def test_the_same_seed_damages_the_same() -> None:

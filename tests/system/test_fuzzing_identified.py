@@ -14,6 +14,10 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
 from tests.fuzz.identified import Base, base, identified, parted, reports_damage, written
 from tests.fuzz.tables import DAMAGING, HARMLESS
+from tests.support.repeats import mark_repeats
+
+HARMLESS_DAILY = ("other_units", "later_clock", "missing_outside")
+"""Changes of the numbers, of the time and of the samples; the others change the text alone."""
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +25,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Base:
     return base(ScenarioName.PAPER_STEPS, Method.INTEGRAL, tmp_path_factory.mktemp("fuzz"))
 
 
-@pytest.mark.parametrize("kind", HARMLESS)
+@pytest.mark.parametrize("kind", mark_repeats(HARMLESS, HARMLESS_DAILY))
 def test_harmless_changes_leave_the_result(kind: str, sound: Base, tmp_path: Path) -> None:
     table = HARMLESS[kind](sound.table, np.random.default_rng(3))
     found = identified(written(table, tmp_path), sound.card, Method.INTEGRAL)
@@ -30,9 +34,10 @@ def test_harmless_changes_leave_the_result(kind: str, sound: Base, tmp_path: Pat
 
 TELLING = ("missing_anywhere", "stuck", "dropout", "spiked", "wrapped", "exchanged", "bad_clock")
 """Damage that must be refused or reported in any channel; other damage may stay unnoticed."""
+DAMAGING_DAILY = (*TELLING, "cut", "late")
 
 
-@pytest.mark.parametrize("kind", DAMAGING)
+@pytest.mark.parametrize("kind", mark_repeats(DAMAGING, DAMAGING_DAILY))
 def test_damage_ends_as_a_result_or_a_typed_error(kind: str, sound: Base, tmp_path: Path) -> None:
     table = DAMAGING[kind](sound.table, np.random.default_rng(8))
     try:
@@ -54,7 +59,7 @@ def test_a_gap_shortly_before_the_end_costs_nothing_else(
     assert not parted(identified(log, sound.card, Method.INTEGRAL), sound.found)
 
 
-@pytest.mark.parametrize("others", [(), ("SpdWhl",), ("PrsBrk3",)])
+@pytest.mark.parametrize("others", mark_repeats([(), ("SpdWhl",), ("PrsBrk3",)], [()]))
 def test_a_late_output_torque_is_told(others: tuple[str, ...], sound: Base, tmp_path: Path) -> None:
     table = sound.table
     for name in ("TrqOut", *others):

@@ -26,6 +26,7 @@ from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import FloatArray, State
 from tests.export.modelica import compiled
+from tests.support.repeats import mark_repeats
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared"
@@ -125,7 +126,7 @@ def run_fmu(path: Path, inputs: FloatArray, step: float) -> tuple[FloatArray, Fl
 
 
 @pytest.mark.skipif(detect_platform() is None, reason="FMI names no platform like this one")
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("version", mark_repeats(["2.0", "3.0"], ["3.0"]))
 @pytest.mark.parametrize("name", LOGS)
 def test_fmu(name: str, version: str, tmp_path: Path) -> None:
     """Held inputs act half a step late, so those that act are given every 0.25 ms."""
@@ -158,7 +159,7 @@ def test_c(name: str, tmp_path: Path) -> None:
     assert known.compare(*run_c(tmp_path / "logged", logged), get_lag(known)) < WORSE
 
 
-@pytest.mark.parametrize("as_logged", [False, True])
+@pytest.mark.parametrize("as_logged", mark_repeats([False, True], [True]))
 @pytest.mark.parametrize("name", LOGS)
 def test_modelica(name: str, as_logged: bool, tmp_path: Path) -> None:
     """From the torque phase until lock-up: the compiler takes minutes for a whole log.

@@ -11,11 +11,14 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.effects import EffectId
+from tests.support.repeats import mark_repeats
 
+DAILY = (EffectId.AERO_LOAD, EffectId.TYRE_SLIP, EffectId.INPUT_SHAFT_MODE)
+"""A load, an effect of the driveline and one that takes another network."""
 SIZES = {EffectId.INPUT_SHAFT_MODE: 60.0, EffectId.AERO_LOAD: 0.1}
 
 
-@pytest.mark.parametrize("effect", EffectId)
+@pytest.mark.parametrize("effect", mark_repeats(EffectId, DAILY))
 def test_every_effect_leaves_a_shift_to_identify(effect: EffectId) -> None:
     made = make_mismatch_log(4, effect, SIZES.get(effect, 0.003), Rates.LOGGER)
     (shift,) = detect_shifts(made.log, made.card).shifts

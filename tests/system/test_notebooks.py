@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.repeats import mark_repeats
+
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "examples" / "notebooks"
 LEAVES = {
     "identify_a_shift": {"report.html", "result.json", "twin.toml"},
@@ -22,7 +24,9 @@ def test_every_notebook_is_run() -> None:
     assert {path.stem for path in NOTEBOOKS.glob("*.py")} == set(LEAVES)
 
 
-@pytest.mark.parametrize("name", LEAVES)
+@pytest.mark.parametrize(
+    "name", mark_repeats(LEAVES, LEAVES.keys() - {"identify_a_shift"}, pytest.mark.howto)
+)
 def test_a_notebook_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     path = NOTEBOOKS / f"{name}.py"

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.progress import SCENARIOS, Timeline, make_bench, record_timeline
 from drivetwin.estimation.result.method import Method
+from tests.support.repeats import mark_repeats
 
 QUIET = 1.0
 """Time from which a run shows its progress [s]."""
@@ -17,7 +18,7 @@ DEVIATION = 0.2
 """Largest deviation of the share shown from the share of the CPU time gone."""
 
 
-@pytest.mark.parametrize("scenario", ["paper_steps", "gearbox"])
+@pytest.mark.parametrize("scenario", mark_repeats(["paper_steps", "gearbox"], ["paper_steps"]))
 def test_an_identification_shows_its_share_of_the_time(tmp_path: Path, scenario: str) -> None:
     assert scenario in SCENARIOS
     bench = make_bench(tmp_path, scenario, seed=3)  # the table was measured with other noise

@@ -20,6 +20,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
+from tests.support.repeats import mark_repeats
 
 MODULATED = (ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS)
 WITHIN_HALF_A_PERCENT = (
@@ -46,7 +47,7 @@ def _friction_error(curve: FrictionCurve, law: Stribeck | FrictionTable) -> floa
     return float(np.abs(curve.mu / law.evaluate(curve.slip) - 1.0).max())
 
 
-@pytest.fixture(scope="module", params=MODULATED)
+@pytest.fixture(scope="module", params=mark_repeats(MODULATED, MODULATED[:1]))
 def noise_free(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Identification, Truth]:
@@ -79,6 +80,7 @@ def test_noise_free_delay_of_the_engine_torque_returns(
     )
 
 
+@pytest.mark.exhaustive
 def test_paper_method_returns_the_grid_points_of_the_truth(tmp_path: Path) -> None:
     found, truth = _identified(tmp_path, ScenarioName.THROTTLE_STEPS, Method.PAPER, 0.0)
     estimates = found.estimates

@@ -16,6 +16,7 @@ from drivetwin.gearbox.maneuver import plan
 from drivetwin.gearbox.network import build_network_elements
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
 from drivetwin.simulation.network import Element, NetworkRun, Output, Start, simulate
+from tests.support.repeats import mark_repeats
 
 BOXES = [name for name in list_builtin_gearboxes() if not load_gearbox(name).dogs]
 SECOND = np.array([0.0, 1.0])
@@ -143,7 +144,7 @@ def under_any_pressures(name: str, rng: np.random.Generator) -> WholeGearbox:
     return replace(stated, inputs=inputs)
 
 
-@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("name", mark_repeats(BOXES, ("ravigneaux-4", "zf-8hp70")))
 def test_a_gearbox_runs_through_any_pressures(name: str) -> None:
     rng, time = np.random.default_rng(1), np.linspace(0.0, 1.0, 1001)
     for case in range(60):

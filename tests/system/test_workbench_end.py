@@ -14,8 +14,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.repeats import mark_repeats
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="children are listed in /proc")
 
+SIGNALS = ("SIGHUP", "SIGTERM", "SIGINT", "SIGKILL")
 Started = Callable[[], subprocess.Popen[str]]
 
 _BUSY = """
@@ -104,7 +107,7 @@ def _wait_for_none(leader: int) -> set[int]:
     return left
 
 
-@pytest.mark.parametrize("sent", ["SIGHUP", "SIGTERM", "SIGINT", "SIGKILL"])
+@pytest.mark.parametrize("sent", mark_repeats(SIGNALS, ("SIGTERM", "SIGKILL"), pytest.mark.faults))
 def test_nothing_is_left(tmp_path: Path, started: Started, sent: str) -> None:
     process = started()
     process.send_signal(signal.Signals[sent])

@@ -30,6 +30,7 @@ from drivetwin.export.parameters.files import read_parameters
 from drivetwin.export.targets import FmiVersion, InputKind, Platform
 from drivetwin.simulation.dual_clutch import FloatArray
 from tests.export.cases import CASES, STEP, Case, paper_subject
+from tests.support.repeats import mark_repeats
 
 pytestmark = pytest.mark.skipif(
     detect_platform() is None, reason="FMI names no platform like this one"
@@ -418,7 +419,7 @@ def test_sources_inside_are_complete(built: Built, tmp_path: Path) -> None:
     compile_library([folder / name for name in listed], tmp_path / "again.so", None)
 
 
-@pytest.mark.parametrize("version", FmiVersion)
+@pytest.mark.parametrize("version", mark_repeats(FmiVersion, [FmiVersion.FMI3]))
 @pytest.mark.parametrize(
     ("names", "expected"),
     [

@@ -18,13 +18,17 @@ from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG, enter
 
 HERE = "http://127.0.0.1:8050"
-VALUES: tuple[Any, ...] = (
-    None, True, 0, -1, 3.5, 10**400, 1e308, float("nan"), float("inf"), "", "x", "\0", "\ud800",
-    "../" * 50, "/", "a" * 10_000, "\x1b[2J", "-1", "1e999", "\u0661", [], [[]], [None], ["x"],
-    {}, {"key": 1}, {"id": []}, {"key": "x", "name": {}}, {"shapes[0].x0": "x"},
+DAILY: tuple[Any, ...] = (
+    None, True, -1, 10**400, float("nan"), "", "x", "\ud800", "../" * 50, [], ["x"], {}, {"id": []},
     {"shapes[0].x0": 10**400},
 )  # fmt: skip
-LABELS = [f"{number}-{str(value)[:12]!a}" for number, value in enumerate(VALUES)]
+"""Values of each type."""
+REPEATS: tuple[Any, ...] = (
+    0, 3.5, 1e308, float("inf"), "\0", "/", "a" * 10_000, "\x1b[2J", "-1", "1e999", "\u0661",
+    [[]], [None], {"key": 1}, {"key": "x", "name": {}}, {"shapes[0].x0": "x"},
+)  # fmt: skip
+VALUES = [*DAILY, *(pytest.param(one, marks=pytest.mark.exhaustive) for one in REPEATS)]
+LABELS = [f"{number}-{str(one)[:12]!a}" for number, one in enumerate([*DAILY, *REPEATS])]
 
 
 class Bench:

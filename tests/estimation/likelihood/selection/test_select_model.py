@@ -33,6 +33,7 @@ from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.vehicle.effects import EffectId
 from tests.estimation.likelihood.fixtures import truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.repeats import mark_repeats
 
 GROWTH = 4.0
 
@@ -105,7 +106,7 @@ def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search
     assert _deviation(fit, "Tv_over_if", truth["Tv_over_if"]) < 3.5
 
 
-@pytest.mark.parametrize("rate", [100.0, 500.0, 1000.0])
+@pytest.mark.parametrize("rate", mark_repeats([100.0, 500.0, 1000.0], [100.0]))
 @pytest.mark.parametrize("means", [True, False])
 def test_speeds_are_taken_for_what_they_are(rate: float, means: bool) -> None:
     made = record_bench(_sent(load_scenario("paper_steps"), rate, means), 0, Knowledge())
