@@ -42,8 +42,10 @@ def compute_moving_mean(values: FloatArray, width: int) -> FloatArray:
 
 def integrate_trapezoids(values: FloatArray, time: FloatArray) -> FloatArray:
     """Return the integral of `values` (n, ...) over `time` (n,) from the first sample on."""
-    areas = (np.diff(time) * (values[1:] + values[:-1]).T / 2.0).T
-    return np.concatenate([np.zeros((1, *values.shape[1:])), areas.cumsum(axis=0)])
+    total = np.zeros(values.shape)
+    areas = np.add(values[1:], values[:-1], out=total[1:])
+    areas *= (np.diff(time) / 2.0).reshape(-1, *(1,) * (values.ndim - 1))
+    return np.cumsum(total, axis=0, out=total)
 
 
 _BLOCKS, _BLOCK = 64, 2048

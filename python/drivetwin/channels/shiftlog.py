@@ -127,16 +127,25 @@ class Channel:
         """
         if time is self.time:  # as of channels of one table
             return self.values
-        before = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
-        unknown = (time < self.time[0]) | (time > self.time[-1])
         if self.quantity is Quantity.STATE:
-            values = self.values[before]
+            values = self.values[self._find_before(time)]
         else:
             values = np.interp(time, self.time, self.values)
+        return np.where(self.covers(time), values, np.nan)
+
+    def covers(self, time: FloatArray) -> NDArray[np.bool_]:
+        """Return True for each `time` (m,) inside the span and outside the gaps."""
+        known = (time >= self.time[0]) & (time <= self.time[-1])
+        if self.gaps:
+            before = self._find_before(time)
             after = np.clip(before + 1, None, self.time.size - 1)
             pause = self.time[after] - self.time[before]
-            unknown |= (pause > self.gap_limit) & (time > self.time[before])
-        return np.where(unknown, np.nan, values)
+            known &= (pause <= self.gap_limit) | (time <= self.time[before])
+        return np.asarray(known)
+
+    def _find_before(self, time: FloatArray) -> NDArray[np.intp]:
+        """Return the last sample not after each `time` (m,)."""
+        return np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
 
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:

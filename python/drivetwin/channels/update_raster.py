@@ -83,7 +83,8 @@ def _find_clock(time: FloatArray) -> float | None:
     """Return the step [s] of a logger that samples by a clock; None for stamps of messages."""
     rows = np.diff(time) / compute_median_step(time)
     whole = np.round(rows)
-    if np.abs(rows - whole).max() > _UNEVEN:
+    rows -= whole
+    if max(rows.max(), -rows.min()) > _UNEVEN:
         return None
     return float((time[-1] - time[0]) / np.sum(whole))
 

@@ -171,7 +171,7 @@ def _estimate_update_rate(channel: RawChannel) -> float | None:
 
 @remember_for_arrays
 def _is_rising(time: FloatArray) -> bool:
-    return bool(np.isfinite(time).all() and np.all(np.diff(time) > 0.0))
+    return bool(np.isfinite(time).all() and np.all(time[1:] > time[:-1]))
 
 
 def _describe_open_roles(

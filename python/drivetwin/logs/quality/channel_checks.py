@@ -318,7 +318,7 @@ def check_order(time: FloatArray, where: Where) -> None:
     if not np.isfinite(time).all():
         index = int(np.isfinite(time).argmin())
         raise TimeError(f"sample {index} has no time stamp", "remove or repair it", where)
-    backward = np.flatnonzero(np.diff(time) <= 0)
+    backward = np.flatnonzero(time[1:] <= time[:-1])
     if not backward.size:
         return
     index = int(backward[0]) + 1
@@ -371,8 +371,8 @@ def _check_rate(channel: Channel, where: Where) -> None:
     if channel.quantity is Quantity.STATE:
         return
     step = channel.step
-    longest = int(np.diff(channel.time).argmax())
     if channel.time[-1] - channel.time[0] > MAX_SPARSE * channel.time.size * step:
+        longest = int(np.diff(channel.time).argmax())
         pause = float(channel.time[longest + 1] - channel.time[longest])
         raise TimeError(
             f"time jumps ahead by {pause:.6g} s between two samples",

@@ -78,9 +78,9 @@ def _find_steep_steps(channel: Channel, pause: FloatArray) -> NDArray[np.intp]:
 @remember_for_arrays
 def _find_far_steps(values: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
     """Return the samples after which a speed jumps, and the sizes of the jumps."""
-    change = np.abs(np.diff(values))
-    far = np.flatnonzero(change > MAX_JUMP)
-    return far, change[far]
+    change = np.diff(values)
+    far = np.flatnonzero((change > MAX_JUMP) | (change < -MAX_JUMP))
+    return far, np.abs(change[far])
 
 
 def _measure_delays(channel: Channel) -> tuple[NDArray[np.intp], FloatArray]:

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
 
 from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.signal_processing import (
@@ -159,7 +159,8 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
     mask = np.zeros(values.size, np.bool_)
     if quantity is Quantity.STATE or values.size < 4 * _SURROUNDINGS:
         return None
-    steps = np.abs(np.diff(values))
+    steps = np.diff(values)
+    np.abs(steps, out=steps)
     least = max(
         _SPIKE_SHARE * _compute_usual_range(values),
         _SPIKE_CONTRAST * compute_usual_step(values) if steps.any() else np.inf,
@@ -330,7 +331,9 @@ def find_longest_rest(time: FloatArray, values: FloatArray) -> tuple[float, floa
     if values[start] == 0.0 or moving.size < _ENOUGH or np.mean(moving) < _JITTER:
         return None
     noise = _estimate_noise(elsewhere / estimate_resolution(elsewhere))
-    unlikely = (end - start) * np.log(erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
+    unlikely = (
+        (end - start) * np.log(math.erf(0.5 / (np.sqrt(2.0) * noise))) if noise > 0.0 else 0.0
+    )
     return (float(time[start]), float(time[end])) if unlikely < _UNLIKELY else None
 
 
@@ -382,9 +385,12 @@ def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -
     """
     if compute_median_step(time) > _BEYOND_STEP:
         return None
+    least = max(float(values.max()), -float(values.min())) / BEYOND
+    large = np.count_nonzero(values >= least) + np.count_nonzero(values <= -least)
+    if 2 * large > values.size:  # the median is no smaller
+        return None
     size = np.abs(values)
-    large = np.count_nonzero(BEYOND * size >= size.max())
-    if 2 * large > size.size or size.max() <= BEYOND * np.median(size):
+    if size.max() <= BEYOND * np.median(size):
         return None
     sizes = np.unique(size)
     far = np.flatnonzero(sizes[1:] > BEYOND * sizes[:-1])

@@ -165,7 +165,7 @@ def _compute_block_means(channel: Channel, edges: FloatArray) -> FloatArray:
     """Means (n - 1,) of a channel between `edges` (n,); NaN where a block touches a gap."""
     total = _integrate(channel.values, channel.time)
     mean = np.diff(np.interp(edges, channel.time, total)) / np.diff(edges)
-    inside = np.isfinite(channel.interpolate(edges))
+    inside = channel.covers(edges)
     return np.where(inside[1:] & inside[:-1], mean, np.nan)
 
 
@@ -184,7 +184,7 @@ def sample_means(channel: Channel, time: FloatArray) -> FloatArray:
     sums = np.interp(edges, channel.time, total)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.diff(sums) / np.diff(edges)
-    return np.where(np.isfinite(channel.interpolate(time)), mean, np.nan)
+    return np.where(channel.covers(time), mean, np.nan)
 
 
 def smooth_at_times(channel: Channel, time: FloatArray) -> FloatArray:
