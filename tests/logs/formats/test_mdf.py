@@ -183,7 +183,7 @@ def test_of_two_groups_the_one_with_records_has_the_role(tmp_path: Path) -> None
 def test_without_the_library_the_install_command_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
+    path = save(tmp_path / "log.mdf", [("g", [signal("x", FAST, FAST)])], "3.30")
     monkeypatch.setitem(sys.modules, "asammdf", None)
     with pytest.raises(MissingExtraError) as caught:
         read_raw(path)

@@ -24,10 +24,11 @@ class LogFormat:
 
     A file has it if it starts with one of `starts`, or if `recognises` is True for its first
     bytes. A folder is searched for files with its `endings`. With `guarded` the file is read in a
-    child process, because the library trusts damaged bytes.
+    child process, because the library trusts damaged bytes. `plain` opens simple files of a guarded
+    format without that library, and returns None for the others.
 
-    `opener` and `recognises` name functions of modules of this folder, such as `mdf.open_mdf`. A
-    module is imported when a file may have its format.
+    `opener`, `recognises` and `plain` name functions of modules of this folder, such as
+    `mdf.open_mdf`. A module is imported when a file may have its format.
     """
 
     opener: str
@@ -35,11 +36,23 @@ class LogFormat:
     starts: tuple[bytes, ...] = ()
     recognises: str | None = None
     guarded: bool = False
+    plain: str | None = None
 
     def load_opener(self) -> Opener:
         """Import the function that opens a file."""
         opener: Opener = _import_function(self.opener)
         return opener
+
+    def open_plain(
+        self, path: Path, options: ReadOptions
+    ) -> AbstractContextManager[Recording] | None:
+        """Open a simple file without the library of the format; None for other files."""
+        if self.plain is None:
+            return None
+        found: AbstractContextManager[Recording] | None = _import_function(self.plain)(
+            path, options
+        )
+        return found
 
     def fits(self, head: bytes) -> bool:
         """Return whether a file with these first bytes and no mark has the format."""
@@ -53,7 +66,13 @@ def _import_function(name: str) -> Any:
 
 _CSV = LogFormat("csv.open_csv", (".csv", ".txt", ".tsv", ".dat", ".lvm", ".msl", ".vbo"))
 FORMATS: tuple[LogFormat, ...] = (
-    LogFormat("mdf.open_mdf", (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), guarded=True),
+    LogFormat(
+        "mdf.open_mdf",
+        (".mf4", ".mdf"),
+        (b"MDF     ", b"UnFinMF "),
+        guarded=True,
+        plain="mdf_plain.open_plain",
+    ),
     LogFormat(
         "mat.open_mat",
         (".mat",),
@@ -92,7 +111,8 @@ def open_recording(
 ) -> AbstractContextManager[Recording]:
     """Open a log of any format for reading its columns one by one.
 
-    Libraries for binary formats run in a child process, see `open_guarded`. Raises FileFormatError
+    Libraries for binary formats run in a child process, see `open_guarded`; plain MDF 4 files need
+    none. Raises FileFormatError
     where the file cannot be read, MissingExtraError where the library for its format is not
     installed, and the errors of its reader.
     """
@@ -105,6 +125,8 @@ def open_recording(
         raise FileFormatError(what, "check the path", Where(file=str(path))) from None
     chosen = _select_format(head, path)
     options = options or ReadOptions()
+    if (plain := chosen.open_plain(path, options)) is not None:
+        return _add_net_torque(plain)
     if chosen.guarded:
         return _add_net_torque(open_guarded(chosen.load_opener(), path, options))
     return _add_net_torque(chosen.load_opener()(path, options))

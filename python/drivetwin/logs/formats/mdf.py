@@ -38,7 +38,7 @@ from drivetwin.logs.raw import (
     subtract_origin,
 )
 
-_KIND = "an MDF file"
+KIND = "an MDF file"
 _FRAGMENT = 1 << 23
 """Bytes of records read at a time, of all channels; bounds the memory for one channel."""
 
@@ -76,17 +76,17 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
 
     Raises MissingExtraError without asammdf, FileFormatError for a damaged file.
     """
-    asammdf = import_extra("asammdf", "mdf", _KIND, path)
+    asammdf = import_extra("asammdf", "mdf", KIND, path)
     check_blocks(path)
     with path.open("rb") as file:
         finished = file.read(8) == _FINISHED
         file.seek(0)
-        with handle_parser_errors(_KIND, path):
+        with handle_parser_errors(KIND, path):
             # An unfinished file is completed in a copy, which asammdf makes of a named file only.
             mdf = asammdf.MDF(file if finished else path, **_OPTIONS)
             mdf.configure(read_fragment_size=_FRAGMENT)
         try:
-            with handle_parser_errors(_KIND, path):
+            with handle_parser_errors(KIND, path):
                 signals = MdfRecording(mdf, path, options)
                 frames = read_bus_frames(mdf, signals.origin)
             yield _merge_bus_frames(signals, frames, options, path)
@@ -184,7 +184,7 @@ class MdfRecording:
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one channel, in a window only the records inside; see `Recording`."""
         place, column = self._places[index], self.columns[index]
-        with handle_parser_errors(_KIND, self._path):
+        with handle_parser_errors(KIND, self._path):
             time = self._load_stamps(place.group)
             first, count = 0, time.size
             if window is not None:
@@ -204,7 +204,7 @@ class MdfRecording:
             raise FileFormatError(
                 f"{values.size} values for {time.size} time stamps", "record the log again", where
             )
-        numbers = values.astype(np.float64)
+        numbers = values.astype(np.float64, copy=not values.flags.owndata)
         notes = (codes,) if codes else ()
         if invalid is not None and invalid.any():
             if invalid.all():
@@ -232,7 +232,9 @@ class MdfRecording:
         """Return the stamps [s] of a group; the stamps of the last group are cached."""
         if self._stamps is None or self._stamps[0] != group:
             master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
-            self._stamps = (group, subtract_origin(master * self._factors[group], self.origin))
+            if self._factors[group] != 1.0:
+                master = master * self._factors[group]
+            self._stamps = (group, subtract_origin(master, self.origin))
         return self._stamps[1]
 
     def _load_samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
@@ -273,7 +275,7 @@ class MdfRecording:
         asammdf takes raw values for physical ones where it cannot evaluate a formula, and computes
         with integers where they are, which overflow.
         """
-        numexpr = import_extra("numexpr", "mdf", _KIND, self._path)
+        numexpr = import_extra("numexpr", "mdf", KIND, self._path)
         try:
             numbers = np.asarray(raw, dtype=np.float64)
             names = {"X": numbers, "X1": numbers, "INF": np.inf, "NaN": np.nan}

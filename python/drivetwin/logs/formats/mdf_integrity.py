@@ -15,7 +15,7 @@ from pathlib import Path
 
 from drivetwin.errors import FileFormatError, Where
 
-_HEADER4 = 64
+HEADER4 = 64
 MOST_INFLATION = 1100
 """Deflate packs zeros about 1030 to 1; a block or group that claims more is damaged."""
 
@@ -40,11 +40,11 @@ def check_blocks(path: Path) -> None:
     Those of MDF 3 are left to asammdf, which notices their damage.
     """
     size = path.stat().st_size
-    if size < _HEADER4 + 64:
+    if size < HEADER4 + 64:
         raise _make_fault(path, f"it ends after {size} bytes")
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         is_version4 = 400 <= int.from_bytes(data[28:30], "little") < 500
-        for problem in _check_chains4(data) if is_version4 else ():
+        for problem in find_problems(data) if is_version4 else ():
             raise _make_fault(path, problem)
 
 
@@ -57,17 +57,18 @@ def _make_fault(path: Path, what: str) -> FileFormatError:
 
 
 @dataclass(frozen=True)
-class _Block:
-    """A block of an MDF 4 file: its kind, links, and where its own data start."""
+class Block:
+    """A block of an MDF 4 file: kind, stated length, links, and start and end of its own data."""
 
     place: int
     kind: bytes
+    length: int
     links: tuple[int, ...]
     body: int
     end: int
 
 
-def _parse_block(data: mmap.mmap, place: int, expected: bytes) -> _Block | str:
+def parse_block(data: mmap.mmap, place: int, expected: bytes) -> Block | str:
     """The block at a place, or what is wrong there."""
     if place % 8 or place + 24 > len(data):
         return f"a block is expected at byte {place} of {len(data)}"
@@ -79,13 +80,13 @@ def _parse_block(data: mmap.mmap, place: int, expected: bytes) -> _Block | str:
     if body > place + length or body > len(data):
         return f"the block at byte {place} claims {links} links in {length} bytes"
     targets = struct.unpack_from(f"<{links}Q", data, place + 24)
-    return _Block(place, kind, targets, body, min(place + length, len(data)))
+    return Block(place, kind, length, targets, body, min(place + length, len(data)))
 
 
-def _check_chains4(data: mmap.mmap) -> Iterator[str]:
+def find_problems(data: mmap.mmap) -> Iterator[str]:
     """Problems of the chains of an MDF 4 file."""
     seen: set[int] = set()
-    waiting = [(_HEADER4, b"##HD", (0, 0))]
+    waiting = [(HEADER4, b"##HD", (0, 0))]
     while waiting:
         place, expected, record = waiting.pop()
         if place in seen and expected in (b"##CC", b""):
@@ -94,7 +95,7 @@ def _check_chains4(data: mmap.mmap) -> Iterator[str]:
             yield f"blocks at byte {place} form a circle"
             return
         seen.add(place)
-        block = _parse_block(data, place, expected)
+        block = parse_block(data, place, expected)
         if isinstance(block, str):
             yield block
             return
@@ -114,7 +115,7 @@ def _check_chains4(data: mmap.mmap) -> Iterator[str]:
         ]
 
 
-def _measure_record(data: mmap.mmap, group: _Block) -> tuple[int, int]:
+def _measure_record(data: mmap.mmap, group: Block) -> tuple[int, int]:
     """Bytes of a record: of its numbers, and of its marks for invalid ones."""
     if group.body + 32 > group.end:
         return 0, 0
@@ -122,7 +123,7 @@ def _measure_record(data: mmap.mmap, group: _Block) -> tuple[int, int]:
     return numbers, marks
 
 
-def _check_channel4(data: mmap.mmap, block: _Block, record: tuple[int, int]) -> Iterator[str]:
+def _check_channel4(data: mmap.mmap, block: Block, record: tuple[int, int]) -> Iterator[str]:
     """A channel must lie inside the record of its group."""
     if block.body + 20 > block.end:
         yield f"the channel at byte {block.place} is cut short"
@@ -138,7 +139,7 @@ def _check_channel4(data: mmap.mmap, block: _Block, record: tuple[int, int]) -> 
         yield f"the channel at byte {block.place} has its mark outside the record"
 
 
-def _check_data_group4(data: mmap.mmap, block: _Block) -> Iterator[str]:
+def _check_data_group4(data: mmap.mmap, block: Block) -> Iterator[str]:
     """The samples must be as many as the one group of a sorted data group claims."""
     if len(block.links) < 3:
         yield f"the data group at byte {block.place} is cut short"
@@ -149,7 +150,7 @@ def _check_data_group4(data: mmap.mmap, block: _Block) -> Iterator[str]:
         if problem:
             yield problem
             return
-    group = _parse_block(data, block.links[1], b"##CG") if block.links[1] else ""
+    group = parse_block(data, block.links[1], b"##CG") if block.links[1] else ""
     if isinstance(group, str) or group.links[:1] != (0,) or group.body + 32 > group.end:
         return  # none, or unsorted: records of several groups mix
     records = struct.unpack_from("<Q", data, group.body + 8)[0]
@@ -166,7 +167,7 @@ def _measure_data(data: mmap.mmap, place: int) -> tuple[int, str]:
         if place in lists:
             return 0, f"the data list at byte {place} forms a circle"
         lists.add(place)
-        block = _parse_block(data, place, b"")
+        block = parse_block(data, place, b"")
         if isinstance(block, str):
             return 0, block
         if block.kind == b"##HL" and block.links:
@@ -184,7 +185,7 @@ def _measure_data(data: mmap.mmap, place: int) -> tuple[int, str]:
 
 def _measure_block_data(data: mmap.mmap, place: int) -> int | str:
     """Bytes that a raw or packed data block holds, or what is wrong with it."""
-    block = _parse_block(data, place, b"")
+    block = parse_block(data, place, b"")
     if isinstance(block, str):
         return block
     if block.kind != b"##DZ":
