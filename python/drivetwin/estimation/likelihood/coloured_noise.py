@@ -19,7 +19,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.output import Output
 from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective, Term
-from drivetwin.estimation.optimize.objective import NormalEquations
+from drivetwin.estimation.optimize.objective import NormalEquations, find_acting
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,13 @@ def compute_long_run_excess(
     for term, residual, regressors in zip(
         problem.terms, normal.residuals, normal.regressors, strict=True
     ):
+        acting = find_acting(regressors)
+        part = regressors[:, acting]
         for out, rows, white in split_whitened(term, residual):
-            columns = out.sigma * regressors[rows]
             excess = compute_slow_power(term, out, rows, white) - counted
-            found += max(excess, 0.0) * columns.T @ columns
+            if excess > 0.0:
+                columns = out.sigma * part[rows]
+                found[np.ix_(acting, acting)] += excess * columns.T @ columns
     return found
 
 

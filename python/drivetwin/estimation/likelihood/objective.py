@@ -26,7 +26,11 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import EXPANSION, RUN, WEIGHTING, charge
 from drivetwin.estimation.likelihood.data.output import Output
 from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
+from drivetwin.estimation.optimize.objective import (
+    NormalEquations,
+    ParameterVector,
+    find_acting,
+)
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -180,17 +184,15 @@ class LikelihoodObjective(Generic[T]):
             if found is None:
                 return None
             residual, slopes = found
-            acting = np.any(slopes, axis=0)
-            is_every = bool(acting.all())
-            columns = np.empty((residual.size, 1 + int(np.count_nonzero(acting))))
+            acting = find_acting(slopes)
+            columns = np.empty((residual.size, 1 + acting.size))
             columns[:, 0] = residual
-            columns[:, 1:] = slopes if is_every else slopes[:, acting]
+            columns[:, 1:] = slopes[:, acting]
             own = columns[:, 1:]
             with np.errstate(over="ignore", invalid="ignore"):
                 weighted = term.weighting.apply_inverse(columns)
-                regressor = weighted[:, 1:] if is_every else np.zeros_like(slopes)
-                if not is_every:
-                    regressor[:, acting] = weighted[:, 1:]
+                regressor = np.zeros_like(slopes)
+                regressor[:, acting] = weighted[:, 1:]
                 square = float(residual @ weighted[:, 0])
                 gradient[acting] -= own.T @ weighted[:, 0]
                 data[np.ix_(acting, acting)] += own.T @ weighted[:, 1:]

@@ -31,7 +31,11 @@ from drivetwin.estimation.likelihood.parametrization import (
     ShiftModel,
     retract,
 )
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
+from drivetwin.estimation.optimize.objective import (
+    NormalEquations,
+    ParameterVector,
+    find_acting,
+)
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
@@ -407,9 +411,14 @@ def compute_column_products(
     for term, z, residual, regressors in zip(
         problem.terms, columns, normal.residuals, normal.regressors, strict=True
     ):
-        weighted = term.weighting.apply_inverse(z)
-        own += z.T @ weighted
-        cross += regressors.T @ z
-        pull += weighted.T @ residual
+        # Effects and unknowns of other logs have columns of zeros here.
+        acting, moving = find_acting(z), find_acting(regressors)
+        part = z[:, acting]
+        answer = term.weighting.apply_inverse(part)
+        own[np.ix_(acting, acting)] += part.T @ answer
+        cross[np.ix_(moving, acting)] += regressors[:, moving].T @ part
+        pull[acting] += answer.T @ residual
+        weighted = np.zeros_like(z)
+        weighted[:, acting] = answer
         every.append(weighted)
     return ColumnProducts(own, cross, pull, tuple(every))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.simulation.variable import Variable
@@ -39,6 +40,14 @@ class _VariableVector(ParameterVector):
         slopes = np.zeros(len(self.names))
         slopes[place] = 1.0
         return Variable(float(self.values[place]), slopes)
+
+
+def find_acting(columns: FloatArray) -> NDArray[np.intp]:
+    """Return the numbers of the `columns` (n, p) that are not zero throughout.
+
+    In a fit of several logs most unknowns act on one log alone.
+    """
+    return np.flatnonzero(np.any(columns, axis=0))
 
 
 @dataclass(frozen=True, eq=False)
