@@ -60,6 +60,19 @@ def sample_blocks(values: FloatArray) -> FloatArray:
     return np.asarray(values[starts[:, None] + np.arange(_BLOCK)])
 
 
+_PART = 1 << 16
+"""Samples that are looked at together [count]: they fit the cache of a processor core."""
+
+
+def find_large_steps(values: FloatArray, least: float) -> NDArray[np.intp]:
+    """Return the samples (m,) of a record (n,) after which it steps by more than `least`."""
+    found = [np.empty(0, np.intp)]
+    for start in range(0, values.size, _PART):
+        steps = np.diff(values[start : start + _PART + 1])
+        found.append(start + np.flatnonzero((steps > least) | (steps < -least)))
+    return np.concatenate(found)
+
+
 def find_true_runs(mask: NDArray[np.bool_], least: int = 1) -> list[tuple[int, int]]:
     """Return first index and end (one past the last) of each run of True in `mask` (n,).
 

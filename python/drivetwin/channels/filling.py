@@ -99,12 +99,12 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     Filling or None
         None where each sample may be measured.
     """
-    usable = np.abs(values) < _LARGEST
-    if not usable.all():
+    if not (values.size and values.min() > -_LARGEST and values.max() < _LARGEST):
+        usable = np.abs(values) < _LARGEST  # without NaN
         time, values = time[usable], values[usable]
     if time.size < 2 * MIN_KNOTS or not is_time_axis(time):
         return None
-    if _is_cycle(values[1:][values[1:] != values[:-1]][:_CYCLE]):
+    if _is_cycle(_list_first_changes(values)):
         return None
     step = compute_median_step(time)
     lines = _find_lines(time, values)
@@ -180,6 +180,15 @@ def _extend_raster(time: FloatArray, values: FloatArray, found: KnotRaster) -> F
         return Filling(interpolation, found.period, step, time[at], values[at])
     knots, heights = extend_knots(time, values, found)
     return Filling(interpolation, found.period, step, knots, heights) if knots.size else None
+
+
+def _list_first_changes(values: FloatArray) -> FloatArray:
+    """Return the first values that differ from those before, at most `_CYCLE`."""
+    some = values[: 8 * _CYCLE]
+    changed = some[1:][some[1:] != some[:-1]]
+    if changed.size < _CYCLE:
+        changed = values[1:][values[1:] != values[:-1]]
+    return changed[:_CYCLE]
 
 
 def _is_cycle(values: FloatArray) -> bool:

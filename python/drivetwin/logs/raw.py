@@ -83,6 +83,11 @@ class RawChannel:
     @property
     def range(self) -> tuple[float, float] | None:
         """Least and greatest number in the file's unit; None if there is no number."""
+        if not self.values.size:
+            return None
+        least, greatest = float(self.values.min()), float(self.values.max())
+        if math.isfinite(least) and math.isfinite(greatest):
+            return least, greatest
         finite = self.values[np.isfinite(self.values)]
         return (float(finite.min()), float(finite.max())) if finite.size else None
 

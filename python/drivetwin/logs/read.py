@@ -357,9 +357,10 @@ class _Conversion:
 
     def convert_values(self, values: FloatArray) -> FloatArray:
         spec, unit = self.spec, self.unit
-        if (spec.sign, spec.scale, spec.offset, unit.factor, unit.offset) == (1, 1, 0, 1, 0):
-            return values  # properties that are kept with the array hold
-        return unit.to_si(spec.sign * (spec.scale * values + spec.offset))
+        # An array that stays the same keeps the properties that are remembered for it.
+        if (spec.sign, spec.scale, spec.offset) != (1.0, 1.0, 0.0):
+            values = spec.sign * (spec.scale * values + spec.offset)
+        return values if (unit.factor, unit.offset) == (1.0, 0.0) else unit.to_si(values)
 
     def convert_filling(self, filling: Filling) -> Filling:
         time, values = self.convert_time(filling.time), self.convert_values(filling.values)

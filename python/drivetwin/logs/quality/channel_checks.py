@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import SHORTEST_STEP, remember_for_arrays
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.signal_processing import estimate_resolution, find_true_runs
+from drivetwin._util.signal_processing import (
+    estimate_resolution,
+    find_large_steps,
+    find_true_runs,
+)
 from drivetwin.channels.roles import AUXILIARY, Quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
@@ -217,7 +221,8 @@ def _check_rounding(channel: Channel) -> list[Finding]:
 
 def _is_binary(values: FloatArray) -> bool:
     """Return True if a signal has only two values, such as the pressure of an on/off valve."""
-    return bool(np.all((values == values.min()) | (values == values.max())))
+    low, high = values.min(), values.max()
+    return all(bool(np.all((one == low) | (one == high))) for one in (values[:SOME], values))
 
 
 def _check_dropouts(channel: Channel) -> Damage | None:
@@ -407,9 +412,9 @@ def _check_wraps(channel: Channel, where: Where) -> None:
         return
     values, span = channel.values, float(np.ptp(channel.values))
     near = WRAP_BESIDE
-    steps = np.abs(np.diff(values))
-    usual = compute_usual_step(values)
-    jumps = np.flatnonzero(steps > max(WRAP_SHARE * span, WRAP_CONTRAST * usual))
+    jumps = find_large_steps(
+        values, max(WRAP_SHARE * span, WRAP_CONTRAST * compute_usual_step(values))
+    )
     for index in jumps[(jumps >= near) & (jumps < values.size - near - 1)]:
         jump = float(values[index + 1] - values[index])
         came = float(values[index] - values[index - near])
@@ -481,7 +486,10 @@ def _check_sign(channel: Channel, where: Where) -> None:
                 f'{{ source = "{channel.source_name}", sign = -1 }}',
                 where,
             )
-    if channel.quantity is Quantity.SPEED and float(np.median(channel.values)) < 0.0:
+    if (
+        channel.quantity is Quantity.SPEED
+        and 2 * np.count_nonzero(channel.values < 0.0) > channel.values.size
+    ):
         raise PlausibilityError(
             "the speed is negative for most of the log; forward motion counts positive",
             f"set the sign in the channel mapping: channels.{channel.role} = "

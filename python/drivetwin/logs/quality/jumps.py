@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import remember_for_arrays
 from drivetwin._util.display_units import format_with_unit
+from drivetwin._util.signal_processing import find_large_steps
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.errors import DamagedChannelError, Where
@@ -78,9 +79,8 @@ def _find_steep_steps(channel: Channel, pause: FloatArray) -> NDArray[np.intp]:
 @remember_for_arrays
 def _find_far_steps(values: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
     """Return the samples after which a speed jumps, and the sizes of the jumps."""
-    change = np.diff(values)
-    far = np.flatnonzero((change > MAX_JUMP) | (change < -MAX_JUMP))
-    return far, np.abs(change[far])
+    far = find_large_steps(values, MAX_JUMP)
+    return far, np.abs(values[far + 1] - values[far])
 
 
 def _measure_delays(channel: Channel) -> tuple[NDArray[np.intp], FloatArray]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.signal_processing import (
     estimate_resolution,
+    find_large_steps,
     find_run_bounds,
     find_true_runs,
     sample_blocks,
@@ -159,46 +160,40 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
     mask = np.zeros(values.size, np.bool_)
     if quantity is Quantity.STATE or values.size < 4 * _SURROUNDINGS:
         return None
-    steps = np.diff(values)
-    np.abs(steps, out=steps)
     least = max(
-        _SPIKE_SHARE * _compute_usual_range(values),
-        _SPIKE_CONTRAST * compute_usual_step(values) if steps.any() else np.inf,
+        _SPIKE_SHARE * _compute_usual_range(values), _SPIKE_CONTRAST * compute_usual_step(values)
     )
     interval = compute_median_step(time)
+    entered = find_large_steps(values, _STEP_INTO_SPIKE * least)
     for width in range(1, _SPIKE_WIDTH + 1):
         if quantity is not Quantity.SPEED and width * interval > _SPIKE_TIME:
             break
-        for start in _find_spike_starts(values, steps, width, least):
+        for start in _find_spike_starts(values, entered, width, least):
             mask[start : start + width] = True
     return _make_damage(mask, Code.SPIKES)
 
 
 def _find_spike_starts(
-    values: FloatArray, steps: FloatArray, width: int, least: float
+    values: FloatArray, entered: NDArray[np.intp], width: int, least: float
 ) -> NDArray[np.intp]:
     """First samples of spikes of one width: both neighbours agree, the rest around is calm.
 
     The neighbours differ by a fifth of the height at most, so that the step into a spike has nine
-    tenths of it; only samples after such a step are looked at.
+    tenths of it; only the samples before such a step, `entered` (m,), are looked at.
     """
-    count = values.size - width - 1
-    before = np.flatnonzero(steps[:count] > _STEP_INTO_SPIKE * least)
+    before = entered[entered < values.size - width - 1]
     after = before + width + 1
     apart = np.abs(values[after] - values[before])
     inside = np.lib.stride_tricks.sliding_window_view(values[1:-1], width)[before]
     inside = inside - 0.5 * (values[before] + values[after])[:, None]
     height = np.abs(inside).min(axis=1, initial=np.inf)
     height[np.abs(np.sign(inside).sum(axis=1)) < width] = 0.0
-    if not before.size:
-        return before
-    # Largest step in the windows that end before and start after the spike.
-    beside = np.arange(_SURROUNDINGS)
+    # Largest step in the windows that end before and start after the spike; none beyond the ends.
+    beside = np.arange(_SURROUNDINGS + 1)
     left, right = (
-        np.where((rows >= 0) & (rows < steps.size), steps[rows.clip(0, steps.size - 1)], 0.0)
-        for rows in (before[:, None] - 1 - beside, after[:, None] + beside)
+        np.abs(np.diff(values[rows.clip(0, values.size - 1)])).max(axis=1, initial=0.0)
+        for rows in (before[:, None] - beside, after[:, None] + beside)
     )
-    left, right = left.max(axis=1), right.max(axis=1)
     around = np.maximum(np.maximum(left, right), apart)
     found = (height > least) & (height > _SPIKE_CONTRAST * around)
     return np.asarray(before[found] + 1)
@@ -214,6 +209,9 @@ def compute_usual_step(values: FloatArray) -> float:
     """Compute the median size of the steps of `values` (n,) that move; 0 without any."""
     steps = np.abs(np.diff(sample_blocks(values)))
     moving = steps[steps > 0.0]
+    if moving.size < _ENOUGH:  # a record that mostly rests
+        steps = np.abs(np.diff(values))
+        moving = steps[steps > 0.0]
     return _compute_median(moving) if moving.size else 0.0
 
 
@@ -229,23 +227,21 @@ def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
     In between it goes on as it would have without the jump, as where an amplifier is disturbed. A
     knock in the backlash of a driveline rises and falls over several samples.
     """
-    steps = np.diff(values)
-    size = np.abs(steps)
-    if values.size < 4 * _SURROUNDINGS or not size.any():
+    if values.size < 4 * _SURROUNDINGS:
         return None
     least = max(
         _SPIKE_SHARE * _compute_usual_range(values), _SPIKE_CONTRAST * compute_usual_step(values)
     )
     mask = np.zeros(values.size, np.bool_)
-    for first, last in pairwise(np.flatnonzero(size > least)):
+    for first, last in pairwise(find_large_steps(values, least)):
         width = int(last - first)
         if width <= _SPIKE_WIDTH or time[last] - time[first] > _PULSE_TIME:
             continue
-        beside = (size[max(0, first - _SURROUNDINGS) : first], size[first + 1 : last],
-                  size[last + 1 :][:_SURROUNDINGS])  # fmt: skip
-        calm = max(part.max(initial=0.0) for part in beside)
-        drift = abs(float(steps[first] + steps[last]))
-        if min(size[first], size[last]) > _SPIKE_CONTRAST * max(calm, drift):
+        beside = (values[max(0, first - _SURROUNDINGS) : first + 1], values[first + 1 : last + 1],
+                  values[last + 1 :][: _SURROUNDINGS + 1])  # fmt: skip
+        calm = max(np.abs(np.diff(part)).max(initial=0.0) for part in beside)
+        into, out = values[first + 1] - values[first], values[last + 1] - values[last]
+        if min(abs(into), abs(out)) > _SPIKE_CONTRAST * max(calm, abs(into + out)):
             mask[first + 1 : last + 1] = True
     return _make_damage(mask, Code.GLITCHES)
 
