@@ -184,11 +184,12 @@ def _extend_raster(time: FloatArray, values: FloatArray, found: KnotRaster) -> F
 
 def _list_first_changes(values: FloatArray) -> FloatArray:
     """Return the first values that differ from those before, at most `_CYCLE`."""
-    some = values[: 8 * _CYCLE]
-    changed = some[1:][some[1:] != some[:-1]]
-    if changed.size < _CYCLE:
-        changed = values[1:][values[1:] != values[:-1]]
-    return changed[:_CYCLE]
+    for rows in (8 * _CYCLE, values.size):
+        first = values[:rows]
+        changed = np.flatnonzero(first[1:] != first[:-1])[:_CYCLE] + 1
+        if changed.size == _CYCLE:
+            break
+    return np.asarray(values[changed])
 
 
 def _is_cycle(values: FloatArray) -> bool:

@@ -55,7 +55,7 @@ from drivetwin.estimation.likelihood.uncertainty.friction_bands import (
     find_reference_slips,
 )
 from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.optimize.objective import ParameterVector, find_acting, join_columns
 from drivetwin.estimation.result.cause import EXPLAINED, WRONG_ENTRY, PredictedSpread
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
@@ -108,8 +108,10 @@ def predict_spread(
             continue
         averaged = term.record.sample_run(run) - term.record.sample_stamps(run)
         mean = term.compute_residual(run) - residual + averaged
-        rows = np.column_stack([slopes, z])
-        variance = term.record.sigma**2 + propagate_variance(rows, joint)
+        rows = join_columns(slopes, z)
+        acting = find_acting(rows)
+        spread = propagate_variance(rows[:, acting], joint[np.ix_(acting, acting)])
+        variance = term.record.sigma**2 + spread
         if term.weighting.path is not None:
             variance += _propagate_inputs(term, fit.point, term.weighting.path)
         found.append(_split(term, mean, np.sqrt(variance)))

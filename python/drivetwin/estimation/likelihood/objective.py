@@ -30,6 +30,7 @@ from drivetwin.estimation.optimize.objective import (
     NormalEquations,
     ParameterVector,
     find_acting,
+    place_columns,
 )
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
@@ -191,8 +192,6 @@ class LikelihoodObjective(Generic[T]):
             own = columns[:, 1:]
             with np.errstate(over="ignore", invalid="ignore"):
                 weighted = term.weighting.apply_inverse(columns)
-                regressor = np.zeros_like(slopes)
-                regressor[:, acting] = weighted[:, 1:]
                 square = float(residual @ weighted[:, 0])
                 gradient[acting] -= own.T @ weighted[:, 0]
                 data[np.ix_(acting, acting)] += own.T @ weighted[:, 1:]
@@ -200,8 +199,8 @@ class LikelihoodObjective(Generic[T]):
                 return None
             cost += square
             residuals.append(residual)
-            regressors.append(regressor)
-            every.append(slopes)
+            regressors.append(place_columns(weighted[:, 1:], acting, size))
+            every.append(place_columns(own, acting, size))
         data = 0.5 * (data + data.T)
         if not (np.all(np.isfinite(data)) and _is_semidefinite(data)):
             return None

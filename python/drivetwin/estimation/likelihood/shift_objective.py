@@ -35,6 +35,8 @@ from drivetwin.estimation.optimize.objective import (
     NormalEquations,
     ParameterVector,
     find_acting,
+    join_columns,
+    place_columns,
 )
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.driveline_run import DrivelineTask
@@ -397,7 +399,7 @@ class ColumnProducts:
             gradient=np.concatenate([np.zeros(len(self.cross)), precision * known - self.pull]),
             information=information,
             data=data,
-            regressors=tuple(np.column_stack(both) for both in pairs),
+            regressors=tuple(join_columns(*both) for both in pairs),
         )
 
 
@@ -413,12 +415,10 @@ def compute_column_products(
     ):
         # Effects and unknowns of other logs have columns of zeros here.
         acting, moving = find_acting(z), find_acting(regressors)
-        part = z[:, acting]
-        answer = term.weighting.apply_inverse(part)
-        own[np.ix_(acting, acting)] += part.T @ answer
-        cross[np.ix_(moving, acting)] += regressors[:, moving].T @ part
+        seen = z[:, acting]
+        answer = term.weighting.apply_inverse(seen)
+        own[np.ix_(acting, acting)] += seen.T @ answer
+        cross[np.ix_(moving, acting)] += regressors[:, moving].T @ seen
         pull[acting] += answer.T @ residual
-        weighted = np.zeros_like(z)
-        weighted[:, acting] = answer
-        every.append(weighted)
+        every.append(place_columns(answer, acting, size))
     return ColumnProducts(own, cross, pull, tuple(every))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -48,6 +49,38 @@ def find_acting(columns: FloatArray) -> NDArray[np.intp]:
     In a fit of several logs most unknowns act on one log alone.
     """
     return np.flatnonzero(np.any(columns, axis=0))
+
+
+def place_columns(acting: FloatArray, index: NDArray[np.intp], count: int) -> FloatArray:
+    """Return `count` columns (n, count), zero but for those `acting` (n, k) at the places `index`
+    (k,).
+
+    Each is contiguous, so that the system assigns no memory to the zeros.
+    """
+    found = np.zeros((len(acting), count), order="F")
+    found[:, index] = acting
+    return found
+
+
+def scale_columns(columns: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return `columns` (n, p) times `scale` (p,), as `place_columns`."""
+    acting = find_acting(columns)
+    return place_columns(columns[:, acting] * scale[acting], acting, columns.shape[1])
+
+
+def select_columns(columns: FloatArray, picked: Sequence[int]) -> FloatArray:
+    """Return some of `columns` (n, p), as `place_columns`."""
+    order = np.asarray(picked, dtype=np.intp)
+    kept = np.flatnonzero(np.isin(order, find_acting(columns)))
+    return place_columns(columns[:, order[kept]], kept, order.size)
+
+
+def join_columns(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return columns (n, p + q), as `place_columns`."""
+    own, other = find_acting(first), find_acting(second)
+    both = np.column_stack([first[:, own], second[:, other]])
+    index = np.concatenate([own, first.shape[1] + other])
+    return place_columns(both, index, first.shape[1] + second.shape[1])
 
 
 @dataclass(frozen=True, eq=False)

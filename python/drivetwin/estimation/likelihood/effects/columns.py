@@ -23,7 +23,12 @@ from drivetwin.estimation.likelihood.effects.effect import (
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.noise.shift_response import STATES, build_output_row
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.optimize.objective import (
+    ParameterVector,
+    place_columns,
+    scale_columns,
+    select_columns,
+)
 from drivetwin.estimation.result.cause import Group
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId, EffectPrior
@@ -120,7 +125,7 @@ class InputColumns:
 
     def select(self, columns: list[int]) -> InputColumns:
         """Return some of the columns."""
-        return InputColumns(self.time, self.matrix[:, columns])
+        return InputColumns(self.time, select_columns(self.matrix, columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +199,7 @@ class EffectColumns:
         return replace(
             self,
             groups=tuple(self.groups[k] for k in picked),
-            matrices=tuple(one[:, picked] for one in self.matrices),
+            matrices=tuple(select_columns(one, picked) for one in self.matrices),
             scale=self.scale[picked],
             inputs=tuple(
                 {name: one.select(picked) for name, one in each.items()} for each in self.inputs
@@ -203,9 +208,12 @@ class EffectColumns:
 
     def rescale(self, scale: FloatArray) -> EffectColumns:
         """Return the columns multiplied by `scale` (q,)."""
-        matrices = tuple(one * scale for one in self.matrices)
+        matrices = tuple(scale_columns(one, scale) for one in self.matrices)
         inputs = tuple(
-            {name: InputColumns(one.time, one.matrix * scale) for name, one in each.items()}
+            {
+                name: InputColumns(one.time, scale_columns(one.matrix, scale))
+                for name, one in each.items()
+            }
             for each in self.inputs
         )
         return replace(self, matrices=matrices, scale=self.scale * scale, inputs=inputs)
@@ -291,11 +299,10 @@ class _ShiftColumns:
 
     def align(self, matrix: FloatArray, keys: Sequence[_Key]) -> FloatArray:
         """Return the columns of a matrix (m, q) in the order of `keys`; zero for foreign ones."""
-        found = np.zeros((len(matrix), len(keys)))
-        for k, key in enumerate(keys):
-            if key in self.keys:
-                found[:, k] = matrix[:, self.keys.index(key)]
-        return found
+        place = {key: k for k, key in enumerate(self.keys)}
+        index = np.array([k for k, key in enumerate(keys) if key in place], dtype=np.intp)
+        own = [place[keys[k]] for k in index]
+        return place_columns(matrix[:, own], index, len(keys))
 
 
 def _build_shift_columns(

@@ -25,7 +25,12 @@ from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_exce
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, compute_column_products
-from drivetwin.estimation.optimize.objective import NormalEquations
+from drivetwin.estimation.optimize.objective import (
+    NormalEquations,
+    join_columns,
+    scale_columns,
+    select_columns,
+)
 from drivetwin.estimation.result.cause import Group
 
 
@@ -71,7 +76,7 @@ class WeightedColumns:
             own=self.own * np.outer(scale, scale),
             cross=self.cross * scale,
             pull=self.pull * scale,
-            weighted=tuple(one * scale for one in self.weighted),
+            weighted=tuple(scale_columns(one, scale) for one in self.weighted),
         )
 
     def join(self, normal: NormalEquations) -> tuple[FloatArray, FloatArray]:
@@ -88,7 +93,7 @@ class WeightedColumns:
             own=self.own[np.ix_(picked, picked)],
             cross=self.cross[:, picked],
             pull=self.pull[picked],
-            weighted=tuple(one[:, picked] for one in self.weighted),
+            weighted=tuple(select_columns(one, picked) for one in self.weighted),
         )
 
 
@@ -317,7 +322,7 @@ def take_joint_step(
         information=matrix,
         residuals=residuals,
         regressors=tuple(
-            np.column_stack(both) for both in zip(normal.regressors, sums.weighted, strict=True)
+            join_columns(*both) for both in zip(normal.regressors, sums.weighted, strict=True)
         ),
     )
     follows = invert_information(normal.information) @ sums.cross
