@@ -186,12 +186,9 @@ class LikelihoodObjective(Generic[T]):
                 return None
             residual, slopes = found
             acting = find_acting(slopes)
-            columns = np.empty((residual.size, 1 + acting.size))
-            columns[:, 0] = residual
-            columns[:, 1:] = slopes[:, acting]
-            own = columns[:, 1:]
+            own = slopes[:, acting]
             with np.errstate(over="ignore", invalid="ignore"):
-                weighted = term.weighting.apply_inverse(columns)
+                weighted = term.weighting.apply_inverse(np.column_stack([residual, own]))
                 square = float(residual @ weighted[:, 0])
                 gradient[acting] -= own.T @ weighted[:, 0]
                 data[np.ix_(acting, acting)] += own.T @ weighted[:, 1:]
