@@ -4,7 +4,7 @@
 `python -m benchmarks.pipeline [--large] [--write]`: each command is a process of its own on one
 BLAS thread. `--large` adds the CSV log of one hour and the MDF file of 0.3 GB, `--write` writes
 docs/benchmarks-pipeline.md with a profile of each command that misses its limit. The other
-programs are pandas, and a fit by SciPy's least squares with a simulator in C
+programs are pandas (its process, imports included), and a fit by SciPy's least squares with a simulator in C
 (`peers/run_identify.py` of the shared data, where that is at hand).
 """
 
@@ -15,7 +15,7 @@ import platform
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -48,9 +48,8 @@ print(time.process_time() - start)
 _PANDAS = """
 import sys, time
 import pandas
-start = time.process_time()
-pandas.read_csv(sys.argv[1], skiprows=[1])
-print(time.process_time() - start)
+pandas.read_csv(sys.argv[1])
+print(time.process_time())
 """
 
 
@@ -102,8 +101,12 @@ Measured on: {machine}; Python {python}; load average {load:.1f}; code of commit
 """
 
 
-def run_process(command: Sequence[str]) -> tuple[float, float, str]:
+def run_process(
+    command: Sequence[str], variables: Mapping[str, str] | None = None
+) -> tuple[float, float, str]:
     """Run a command; return its CPU time [s], peak memory [GB] and output.
+
+    `variables` are added to the environment.
 
     Raises CalledProcessError where it fails.
     """
@@ -111,6 +114,7 @@ def run_process(command: Sequence[str]) -> tuple[float, float, str]:
         **os.environ,
         "OPENBLAS_NUM_THREADS": "1",
         "PYTHONPATH": f"{ROOT / 'python'}{os.pathsep}{ROOT}",
+        **(variables or {}),
     }
     alone.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed package is compiled
     with tempfile.TemporaryFile() as output:
@@ -141,6 +145,15 @@ def measure_command(
     return replace(measured, profile=run_process(command)[2].partition(PROFILE_MARK)[2])
 
 
+def measure_completion() -> Measurement:
+    """Measure the completion of an option at the shell."""
+    line = "drivetwin identify --veh"
+    asked = {"_DRIVETWIN_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": "2"}
+    command = [sys.executable, "-m", "drivetwin"]
+    taken = min(run_process(command, asked)[:2] for _ in range(REPEATS))
+    return Measurement("completion at the shell", *taken, 0.2)
+
+
 def measure_script(script: str, *arguments: str) -> tuple[float, float]:
     """Return the least time [s] that a script prints, and its memory [GB]."""
     runs = [run_process([sys.executable, "-c", script, *arguments]) for _ in range(REPEATS)]
@@ -161,8 +174,9 @@ def measure_paper_log(folder: Path) -> Iterator[Measurement]:
     peer = measure_peer_fit()
     out = str(folder / "out")
     identify = ("identify", log, "--vehicle", card, "-o", out)
-    yield measure_command("`--help`", ["--help"], 0.25)
-    yield measure_command("`identify`", identify, 2.5, peer, 7.0)
+    yield measure_command("`--help`", ["--help"], 0.2)
+    yield measure_completion()
+    yield measure_command("`identify`", identify, 2.5, peer, 8.0)
     fit = measure_script(_FIT, log, card)
     yield Measurement("fit with intervals alone", *fit, 3.0 * peer, peer, 3.0)
     yield measure_command("`identify --method paper`", [*identify, "--method", "paper"], 1.3)
@@ -187,7 +201,7 @@ def measure_large_files(folder: Path) -> Iterator[Measurement]:
     write_large_csv(csv)
     parsed, _ = measure_script(_PANDAS, str(csv))
     yield measure_command(
-        "`inspect`, CSV of 1 h × 1 kHz × 7", ["inspect", str(csv)], 12.0, parsed, 5.0
+        "`inspect`, CSV of 1 h × 1 kHz × 7", ["inspect", str(csv)], 12.0, parsed, 4.0
     )
     csv.unlink()
     write_large_mdf(mf4)
