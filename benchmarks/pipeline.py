@@ -4,8 +4,8 @@
 `python -m benchmarks.pipeline [--large] [--write]`: each command is a process of its own on one
 BLAS thread. `--large` adds the CSV log of one hour and the MDF file of 0.3 GB, `--write` writes
 docs/benchmarks-pipeline.md with a profile of each command that misses its limit. The other
-programs are pandas (its process, imports included), and a fit by SciPy's least squares with a simulator in C
-(`peers/run_identify.py` of the shared data, where that is at hand).
+programs are pandas (its process, imports included), and a fit by SciPy's least squares with a
+simulator in C (`peers/run_identify.py` of the shared data, where that is at hand).
 """
 
 from __future__ import annotations
