@@ -48,6 +48,11 @@ def integrate_trapezoids(values: FloatArray, time: FloatArray) -> FloatArray:
     return np.cumsum(total, axis=0, out=total)
 
 
+def find_largest(values: FloatArray) -> float:
+    """Return the largest magnitude in `values` (n,); 0 without any."""
+    return max(float(values.max(initial=0.0)), -float(values.min(initial=0.0)))
+
+
 _BLOCKS, _BLOCK = 64, 2048
 """Blocks and rows of one [count] that show a quantile of a long record within 0.3 % of its rows."""
 
@@ -133,7 +138,7 @@ def _measure_gaps(values: FloatArray) -> tuple[float, bool]:
 
 def _find_round_off(values: FloatArray) -> float:
     """Return the distance below which two of the `values` (n,) are one number."""
-    return _ROUND_OFF * max(float(np.abs(values).max(initial=0.0)), _ROUND_OFF)
+    return _ROUND_OFF * max(find_largest(values), _ROUND_OFF)
 
 
 def apply_lag(values: FloatArray, step: float, time_constant: float) -> FloatArray:

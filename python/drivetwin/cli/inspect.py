@@ -214,16 +214,19 @@ def _read_as_mapped_log(
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
     """Read a log as for use, missing roles allowed; return findings, error and who refuses it."""
     from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.logs.read import Demands, read_recording
+    from drivetwin.logs.open_mapped import name_project_mapping
+    from drivetwin.logs.read import Demands, assemble_log
 
     any_role, for_shifts = Demands((), None, gearing), Demands((), FOR_SHIFTS, gearing)
     try:
-        found = read_recording(recording, log, card, stated, any_role)
+        with name_project_mapping(stated):
+            found = assemble_log(recording, str(log), card, stated, any_role)
         return found.findings, None, ""
     except DrivetwinError as fault:
         refusal = fault
     try:
-        found = read_recording(recording, log, card, stated, for_shifts)
+        with name_project_mapping(stated):
+            found = assemble_log(recording, str(log), card, stated, for_shifts)
     except DrivetwinError as fault:
         return (), fault, "shifts and identify refuse"
     return found.findings, refusal, "identify refuses"

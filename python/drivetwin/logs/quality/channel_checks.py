@@ -14,6 +14,7 @@ from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.signal_processing import (
     estimate_resolution,
     find_large_steps,
+    find_largest,
     find_true_runs,
 )
 from drivetwin.channels.roles import AUXILIARY, Quantity
@@ -207,7 +208,7 @@ def _check_rounding(channel: Channel) -> list[Finding]:
     """Report a measured channel that was rounded coarsely."""
     # Not from one sample to the next: along a ramp of a slow channel all may be many steps apart.
     numbers = channel.values
-    largest = float(np.abs(numbers).max(initial=0.0))
+    largest = find_largest(numbers)
     if channel.quantity in AUXILIARY or _is_binary(channel.values):
         return []
     if 0.0 < estimate_resolution(numbers[:SOME]) <= COARSE * largest:
@@ -450,7 +451,7 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
         unit = find_unit(channel.source_unit)
         lowest = _IDLE
         highest = _FASTEST if unit is not None and unit.factor == RPM else highest
-    largest = float(np.abs(channel.values).max())
+    largest = find_largest(channel.values)
     if largest == 0.0 or lowest <= largest <= highest:
         return
     low, high = _TYPICAL[channel.quantity]

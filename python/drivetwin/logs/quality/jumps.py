@@ -31,11 +31,11 @@ def find_lost_messages(channel: Channel) -> Damage | None:
     """
     if channel.quantity is not Quantity.SPEED:
         return None
-    steep = _find_steep_steps(channel, np.diff(channel.time))
-    if not steep.size:
+    if not _find_far_steps(channel.values)[0].size:
         return None
+    steep = _find_steep_steps(channel, np.diff(channel.time))
     fresh, since = _measure_delays(channel)
-    usual = np.median(since[np.diff(channel.values) != 0.0])
+    usual = np.median(since[np.diff(channel.values) != 0.0]) if steep.size else 0.0
     known = np.isin(steep, _find_steep_steps(channel, since), invert=True)
     mask = np.zeros(channel.time.size, np.bool_)
     for index in steep[known & (since[steep] > CLOSE * usual)].tolist():
@@ -50,9 +50,9 @@ def check_jumps(channel: Channel, where: Where) -> None:
     """
     if channel.quantity is not Quantity.SPEED:
         return
-    jumps = _find_steep_steps(channel, np.diff(channel.time))
-    if jumps.size:
-        jumps = _find_steep_steps(channel, _measure_delays(channel)[1])
+    if not _find_far_steps(channel.values)[0].size:
+        return
+    jumps = _find_steep_steps(channel, _measure_delays(channel)[1])
     if not jumps.size:
         return
     index = int(jumps[0]) + 1
