@@ -14,8 +14,11 @@ from drivetwin._util.signal_processing import (
     compute_moving_mean,
     estimate_resolution,
     estimate_rounding_step,
+    find_large_steps,
+    find_largest,
     find_true_runs,
     integrate_trapezoids,
+    sample_blocks,
 )
 
 
@@ -80,3 +83,24 @@ def test_true_runs_of_a_least_length_are_all_of_them(mask: list[bool], least: in
 def test_trapezoids_of_a_line_are_its_integral() -> None:
     time = np.array([0.0, 0.1, 0.5, 2.0])
     assert integrate_trapezoids(3.0 * time + 1.0, time) == pytest.approx(1.5 * time**2 + time)
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 65535, 65536, 65537, 150_000])
+def test_large_steps_are_found_across_the_parts_of_a_record(size: int) -> None:
+    values = np.random.default_rng(size).standard_normal(size)
+    expected = np.flatnonzero(np.abs(np.diff(values)) > 1.5)
+    assert np.array_equal(find_large_steps(values, 1.5), expected)
+
+
+def test_blocks_of_a_long_record_are_stretches_from_its_start_to_its_end() -> None:
+    values = np.arange(300_000.0)
+    blocks = sample_blocks(values)
+    assert np.all(np.diff(blocks) == 1.0)
+    assert (blocks[0, 0], blocks[-1, -1]) == (values[0], values[-1])
+    assert np.array_equal(sample_blocks(values[:1000]), values[None, :1000])
+
+
+def test_the_largest_magnitude_is_that_of_either_sign() -> None:
+    assert find_largest(np.array([1.0, -3.0])) == 3.0
+    assert find_largest(np.empty(0)) == 0.0
+    assert np.isnan(find_largest(np.array([1.0, np.nan])))

@@ -306,3 +306,14 @@ def test_knots_of_an_oscillation_that_repeats_exactly_are_found(noise: float) ->
     assert found is not None
     assert found.interpolation is Interpolation.LINEAR
     assert found.period == pytest.approx(0.01)
+
+
+def test_a_long_record_filled_by_lines_is_found_by_its_windows() -> None:
+    """One of more rows than all the windows that are searched first."""
+    knots = np.arange(0.0, 300.0, 0.01)
+    values = np.round(100.0 * np.random.default_rng(1).standard_normal(knots.size), 3)
+    time = np.round(np.arange(299_000) * STEP, 3)
+    found = find_filling(time, np.round(np.interp(time, knots, values), 6))
+    assert found is not None
+    assert found.interpolation is Interpolation.LINEAR
+    assert found.period == pytest.approx(0.01, rel=1e-6)

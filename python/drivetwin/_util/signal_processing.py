@@ -54,7 +54,7 @@ def find_largest(values: FloatArray) -> float:
 
 
 _BLOCKS, _BLOCK = 64, 2048
-"""Blocks and rows of one [count] that show a quantile of a long record within 0.3 % of its rows."""
+"""Blocks of a long record, and rows of a block [count], that show steps and noise: cost of work."""
 
 
 def sample_blocks(values: FloatArray) -> FloatArray:

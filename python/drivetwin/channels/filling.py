@@ -29,7 +29,7 @@ from drivetwin._util.arrays import (
     is_time_axis,
     remember_for_arrays,
 )
-from drivetwin._util.signal_processing import find_true_runs
+from drivetwin._util.signal_processing import find_largest, find_true_runs
 from drivetwin.channels.knot_fit import MIN_KNOTS, KnotRaster, extend_knots, find_raster_of_knots
 from drivetwin.channels.line_corners import (
     PRIOR,
@@ -99,8 +99,8 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     Filling or None
         None where each sample may be measured.
     """
-    if not (values.size and values.min() > -_LARGEST and values.max() < _LARGEST):
-        usable = np.abs(values) < _LARGEST  # without NaN
+    if not find_largest(values) < _LARGEST:  # NaN is not below
+        usable = np.abs(values) < _LARGEST
         time, values = time[usable], values[usable]
     if time.size < 2 * MIN_KNOTS or not is_time_axis(time):
         return None

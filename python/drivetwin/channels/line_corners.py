@@ -15,7 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray, remember_for_arrays
-from drivetwin._util.signal_processing import estimate_rounding_step, find_true_runs
+from drivetwin._util.signal_processing import (
+    estimate_rounding_step,
+    find_largest,
+    find_true_runs,
+)
 
 PRIOR = float(np.log(1e4))
 """Logarithm of the prior odds against a filled channel: one in ten thousand measured ones may be
@@ -58,7 +62,7 @@ def estimate_resolution(values: FloatArray) -> float:
     That of a lattice, else of the last decimal of a text, else of the largest number of a text with
     so many significant digits, else the round-off of the numbers.
     """
-    largest = float(np.abs(values).max(initial=0.0))
+    largest = find_largest(values)
     round_off = ROUND_OFF * largest
     with np.errstate(over="ignore"):
         is_single = np.array_equal(values, values.astype(np.float32))
@@ -142,7 +146,7 @@ def _measure_bends(time: FloatArray, values: FloatArray) -> _Bends:
     slopes = np.abs(values[2:] - values[:-2]) / span
     rest = (values[1:-1] == values[:-2]) & (values[2:] == values[1:-1])
     step = estimate_resolution(values)
-    round_off = ROUND_OFF * float(np.abs(values).max())
+    round_off = ROUND_OFF * find_largest(values)
     return _Bends(bends, slopes, rest, step + round_off, step > 2.0 * round_off)
 
 

@@ -112,9 +112,8 @@ def open_recording(
     """Open a log of any format for reading its columns one by one.
 
     Libraries for binary formats run in a child process, see `open_guarded`; plain MDF 4 files need
-    none. Raises FileFormatError
-    where the file cannot be read, MissingExtraError where the library for its format is not
-    installed, and the errors of its reader.
+    none. Raises FileFormatError where the file cannot be read, MissingExtraError where the library
+    for its format is not installed, and the errors of its reader.
     """
     measure_regular_file(path, FileFormatError)
     try:

@@ -15,6 +15,7 @@ from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.signal_processing import (
     estimate_resolution,
     find_large_steps,
+    find_largest,
     find_run_bounds,
     find_true_runs,
     sample_blocks,
@@ -119,6 +120,9 @@ signal that sets off from rest may repeat a number just before."""
 _THIRD_DIFFERENCE = 3.02
 """Median size of the third difference of unit white noise, 0.6745·sqrt(20)."""
 
+_LEVELS = 1 << 17
+"""Evenly spread samples that show a quantile of a record [count]: cost of work."""
+
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
 """A limit is reached in so many runs of so many equal samples."""
@@ -218,7 +222,12 @@ def compute_usual_step(values: FloatArray) -> float:
 @remember_for_arrays
 def _compute_usual_range(values: FloatArray) -> float:
     """Compute the range of `values` (n,) without the extreme two percent on each side."""
-    return float(np.ptp(np.percentile(sample_blocks(values), [2, 98])))
+    return float(np.ptp(np.percentile(_thin(values), [2, 98])))
+
+
+def _thin(values: FloatArray) -> FloatArray:
+    """Return evenly spread samples of `values` (n,) that show how often a level is reached."""
+    return values[:: max(1, values.size // _LEVELS)]
 
 
 def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
@@ -355,7 +364,7 @@ def _estimate_noise(codes: FloatArray) -> float:
 
 def find_dropouts(time: FloatArray, values: FloatArray) -> Damage | None:
     """Stretches of exact zeros that the signal falls to, and leaves, in one step."""
-    level = float(np.percentile(np.abs(sample_blocks(values)), 98.0))
+    level = float(np.percentile(np.abs(_thin(values)), 98.0))
     mask = np.zeros(values.size, np.bool_)
     for start, end in find_true_runs(values == 0.0):
         if start == 0 or end == values.size:
@@ -381,7 +390,7 @@ def find_outliers(time: FloatArray, values: FloatArray, possible: float = 0.0) -
     """
     if compute_median_step(time) > _BEYOND_STEP:
         return None
-    least = max(float(values.max()), -float(values.min())) / BEYOND
+    least = find_largest(values) / BEYOND
     large = np.count_nonzero(values >= least) + np.count_nonzero(values <= -least)
     if 2 * large > values.size:  # the median is no smaller
         return None
