@@ -30,10 +30,13 @@ from drivetwin.bus.drift import (
     fit_noise,
     regress,
 )
+from drivetwin.bus.quantities import SQUARE
 from drivetwin.bus.recording import Signal, average_neighbours
 from drivetwin.bus.scatter import Combined, ShiftValue, combine
 from drivetwin.bus.torque import compute_swing_response, integrate_torque
 from drivetwin.estimation.linear.ringdown import RING_DOWN
+from drivetwin.findings import Code, Number, explain
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import Z95
 
 
@@ -58,6 +61,12 @@ class DecaySettings:
     over a sixth of its period has 95 % of its amplitude."""
     samples: int = 80
     """Samples of a decay that are left where neighbours are averaged [count]."""
+    max_damping: float = 0.3
+    """Largest damping ratio of an oscillation [1]: a motion of more damping loses 86 % in a period
+    and has no frequency of its own in noise."""
+    max_sampling_share: float = 1.0 / 3.0
+    """Highest frequency over the sampling rate [ratio]: three samples in a period are the fewest
+    that separate rate, frequency, two amplitudes and a trend."""
     rounds: int = 8
     """Most alternations between noise and oscillator [count]."""
     converged: float = 1e-3
@@ -125,12 +134,14 @@ class DecayFit:
 class JointDecay:
     """Oscillator of a gear: `combined` holds rate σ [1/s] and angular frequency ω [rad/s].
 
-    `chance` is the probability with which noise alone passes for such an oscillation.
+    `chance` is the probability with which noise alone passes for such an oscillation. `step` [s]
+    is the longest sample interval of the records.
     """
 
     combined: Combined
     fits: tuple[DecayFit, ...]
     chance: float
+    step: float
 
     @property
     def swing(self) -> Swing:
@@ -156,6 +167,22 @@ class JointDecay:
         std = 2.0 * float(np.hypot(rate * rate_std, omega * omega_std))
         return rate**2 + omega**2, std
 
+    def explain_implausible(self) -> str:
+        """Return why this is no oscillation of a driveline; empty if it may be one."""
+        frequency, damping = self.compute_frequency()[0], self.compute_damping()[0]
+        square, limits = self.compute_square()[0], get_parameter_spec(SQUARE)
+        low, high = (Number(one, limits.unit) for one in (limits.lower, limits.upper))
+        if damping > DECAY.max_damping:
+            return explain(Code.BUS_DECAY_DAMPED, zeta=damping, limit=DECAY.max_damping)
+        if frequency * self.step > DECAY.max_sampling_share:
+            shown = {"f": Number(frequency, "Hz"), "rate": Number(1.0 / self.step, "Hz")}
+            return explain(Code.BUS_DECAY_SAMPLED, **shown)
+        if not limits.lower <= square <= limits.upper:
+            return explain(
+                Code.BUS_DECAY_STIFF, square=Number(square, limits.unit), low=low, high=high
+            )
+        return ""
+
 
 def build_columns(time: FloatArray, swing: Swing) -> FloatArray:
     """Columns (n, 4) of trend and oscillation."""
@@ -172,33 +199,28 @@ def fit_decays(records: Sequence[DecayRecord], start: Swing | None = None) -> Jo
     swing = start or _find_start(records)
     if swing is None:
         return None
-    records = [one.thin(swing) for one in records]
-    sizes = [_fit_size(one, swing, None) for one in records]
+    step = _compute_step(records)
+    thinned = [one.thin(swing) for one in records]
+    sizes = [_fit_size(one, swing, None) for one in thinned]
     for turn in range(DECAY.rounds):
         if turn:
-            sizes = [_fit_size(one, swing, size) for one, size in zip(records, sizes, strict=True)]
-        made = [_expand(one, swing, size) for one, size in zip(records, sizes, strict=True)]
+            sizes = [_fit_size(one, swing, size) for one, size in zip(thinned, sizes, strict=True)]
+        made = [_expand(one, swing, size) for one, size in zip(thinned, sizes, strict=True)]
         slope = np.sum([one[0] for one in made], axis=0)
         information = np.sum([one[1] for one in made], axis=0)
-        step = _limit_step(swing, slope, information)
-        if step is None:
+        move = _limit_step(swing, slope, information)
+        if move is None:
             return None
-        swing = _move(swing, step)
-        if float(step @ information @ step) < DECAY.converged**2:
+        swing = _move(swing, move)
+        if float(move @ information @ move) < DECAY.converged**2:
             break
-    return _finish(records, swing, sizes)
+    return _finish(thinned, swing, sizes, step)
 
 
 def _finish(
-    records: Sequence[DecayRecord], swing: Swing, sizes: Sequence[NoiseSize]
+    records: Sequence[DecayRecord], swing: Swing, sizes: Sequence[NoiseSize], step: float
 ) -> JointDecay | None:
-    values = []
-    point = np.array([swing.rate, swing.omega])
-    for one, size in zip(records, sizes, strict=True):
-        slope, information = _expand(one, swing, size)
-        values.append(
-            ShiftValue(one.label, point + np.linalg.pinv(information) @ slope, information)
-        )
+    values = [_find_own(one, swing, size) for one, size in zip(records, sizes, strict=True)]
     combined = combine(values)
     if combined is None:
         return None
@@ -207,7 +229,23 @@ def _finish(
         DecayFit(one, size, _compute_mean(one, found, size))
         for one, size in zip(records, sizes, strict=True)
     )
-    return JointDecay(combined, fits, _compute_chance(records, swing, sizes))
+    return JointDecay(combined, fits, _compute_chance(records, swing, sizes), step)
+
+
+def _find_own(one: DecayRecord, swing: Swing, size: NoiseSize) -> ShiftValue:
+    """Rate and angular frequency of one decay, the maximum that is nearest to the common `swing`.
+
+    One Newton step would leave the range of its expansion where a decay contradicts the others.
+    """
+    for _ in range(DECAY.rounds):
+        slope, information = _expand(one, swing, size)
+        step = _limit_step(swing, slope, information)
+        if step is None:
+            break
+        swing = _move(swing, step)
+        if float(step @ information @ step) < DECAY.converged**2:
+            break
+    return ShiftValue(one.label, np.array([swing.rate, swing.omega]), information)
 
 
 def _fit_size(one: DecayRecord, swing: Swing, start: NoiseSize | None) -> NoiseSize:
@@ -259,8 +297,7 @@ def _find_start(records: Sequence[DecayRecord]) -> Swing | None:
     """Oscillator that explains most of all decays by plain least squares."""
     shortest = min(float(one.time[-1]) for one in records)
     slowest = DECAY.min_periods / shortest
-    finest = max(float(np.median(np.diff(one.time))) for one in records)
-    fastest = min(RING_DOWN.band[1], RING_DOWN.max_nyquist_share * 0.5 / finest)
+    fastest = min(RING_DOWN.band[1], DECAY.max_sampling_share / _compute_step(records))
     if not slowest < fastest:
         return None
     trials = [
@@ -269,6 +306,11 @@ def _find_start(records: Sequence[DecayRecord]) -> Swing | None:
         for damping in DECAY.dampings
     ]
     return min(trials, key=lambda swing: sum(_compute_log_rms(one, swing) for one in records))
+
+
+def _compute_step(records: Sequence[DecayRecord]) -> float:
+    """Longest median sample interval [s] of the records."""
+    return max(float(np.median(np.diff(one.time))) for one in records)
 
 
 def _compute_log_rms(one: DecayRecord, swing: Swing) -> float:

@@ -17,6 +17,7 @@ from drivetwin.bus.alignment import (
     estimate_delay,
     split_span,
 )
+from drivetwin.bus.converter import drop_engine, set_converter_aside
 from drivetwin.bus.decay import (
     DECAY,
     DecayPrediction,
@@ -33,7 +34,6 @@ from drivetwin.bus.quantities import (
     RATIO,
     SQUARE,
     make_estimate,
-    make_id,
     refuse,
 )
 from drivetwin.bus.recording import BusLog, prepare_bus_log
@@ -41,12 +41,14 @@ from drivetwin.bus.road_load import RoadLoad
 from drivetwin.bus.scatter import Combined, combine
 from drivetwin.bus.torque import TorqueBalance
 from drivetwin.bus.torque_estimates import estimate_torques, find_dead_time
+from drivetwin.bus.unknown_ratios import find_unknown_ratios, report_unknown_ratios
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
 from drivetwin.estimation.linear.ringdown import RING_DOWN
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain, report
+from drivetwin.plausibility.ratios import HeldRatio, is_held
 from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.vehicle.spec import Z95
 
@@ -98,6 +100,8 @@ def identify_bus(
     bus = [prepare_bus_log(one, Path(one.source).name) for one in logs]
     others = [prepare_bus_log(one, Path(one.source).name) for one in held_out]
     ratios = estimate_ratios(bus) if card is None else _get_values(card)
+    bus, remarks = set_converter_aside(bus, ratios)
+    others = [drop_engine(one) for one in others] if remarks else others
     late, aligned = _align(bus, ratios)
     timelines = [find_timeline(one, ratios, late) for one in bus]
     if not any(one.held for one in timelines):
@@ -106,7 +110,8 @@ def identify_bus(
             "check the ratios on the card, and the speeds with 'drivetwin inspect'",
             Where(file=bus[0].source if bus else None),
         )
-    made = _ResultBuilder(ratios, card)
+    made = _ResultBuilder(ratios, card, [] if card is None else find_unknown_ratios(bus, card))
+    made.findings += remarks
     made.add_alignment(aligned)
     made.add_decays(_collect_decays(timelines))
     dead = find_dead_time(timelines, ratios, late, made.decays)
@@ -123,7 +128,7 @@ def identify_bus(
     for line in (find_timeline(one, ratios, late) for one in others):
         for gear, each in _collect_decays([line], dead).items():
             if gear in made.decays:
-                predictions |= {one.label: predict_decay(made.decays[gear], one) for one in each}
+                predictions |= made.predict(made.decays[gear], each)
     return BusIdentification(
         made.estimates,
         ratios,
@@ -137,11 +142,14 @@ def identify_bus(
     )
 
 
-def find_shifts(log: ShiftLog, card: RatioCard) -> Timeline:
-    """Find the gears held and the shifts of one bus log with their phases."""
-    bus, ratios = prepare_bus_log(log, Path(log.source).name), _get_values(card)
-    late, _ = _align([bus], ratios)
-    return find_timeline(bus, ratios, late)
+def find_shifts(log: ShiftLog, card: RatioCard) -> tuple[Timeline, tuple[Finding, ...]]:
+    """Find the gears held and the shifts of one bus log with their phases, and findings."""
+    ratios = _get_values(card)
+    bus, remarks = set_converter_aside([prepare_bus_log(log, Path(log.source).name)], ratios)
+    late, _ = _align(bus, ratios)
+    line = find_timeline(bus[0], ratios, late)
+    unknown = report_unknown_ratios(find_unknown_ratios(bus, card), card)
+    return line, (*remarks, *unknown, *find_limits(line))
 
 
 def _get_values(card: RatioCard) -> dict[str, float]:
@@ -243,13 +251,16 @@ def find_contradictions(quantity: str, combined: Combined) -> Iterator[Finding]:
 class _ResultBuilder:
     """Estimates and findings, added stage by stage."""
 
-    def __init__(self, ratios: Mapping[str, float], card: RatioCard | None) -> None:
+    def __init__(
+        self, ratios: Mapping[str, float], card: RatioCard | None, unknown: Sequence[HeldRatio]
+    ) -> None:
         self.ratios = ratios
         self.card = card
+        self.unknown = unknown
         self.estimates: dict[str, Estimate] = {}
         self.decays: dict[str, JointDecay] = {}
-        self.refused: set[str] = set()
-        self.findings: list[Finding] = []
+        self.refused: dict[str, str] = {}
+        self.findings = [] if card is None else report_unknown_ratios(unknown, card)
 
     def add_alignment(self, aligned: Mapping[str, Alignment]) -> None:
         """Add ratios and delays."""
@@ -271,7 +282,9 @@ class _ResultBuilder:
         one = make_estimate(RATIO, gear, value, std, combined)
         self.estimates[one.id] = one
         stated = None if self.card is None else self.card.ratios[gear]
-        if stated is not None and abs(value - stated.value) > Z95 * np.hypot(std, stated.std):
+        if stated is None or is_held(value, self.unknown):
+            return
+        if abs(value - stated.value) > Z95 * np.hypot(std, stated.std):
             half = Number(Z95 * std)
             self.findings.append(
                 report(Code.BUS_RATIO_DIFFERS, gear=gear, found=value, half=half, card=stated.value)
@@ -284,19 +297,35 @@ class _ResultBuilder:
                 continue
             known = self.decays.get(gear)
             joint = fit_decays(records[gear], None if known is None else known.swing)
-            if joint is not None and joint.chance < RING_DOWN.chance:
-                self.decays[gear] = joint
+            if joint is None or not joint.chance < RING_DOWN.chance:
+                self.refused[gear] = explain(Code.BUS_NO_DECAY)
+            elif reason := joint.explain_implausible():
+                self.refused[gear] = reason
             else:
-                self.refused.add(gear)
+                self.decays[gear] = joint
+
+    def predict(
+        self, joint: JointDecay, records: Sequence[DecayRecord]
+    ) -> dict[str, DecayPrediction]:
+        """Predict decays that took no part; one shorter than a period gives a finding."""
+        made = {one.label: predict_decay(joint, one) for one in records}
+        period = Number(2.0 * np.pi / joint.swing.omega, "s")
+        for one in records:
+            if not made[one.label].predicted.size:
+                length = Number(float(one.time[-1]), "s")
+                self.findings.append(
+                    report(Code.BUS_DECAY_SHORT, one.label, length=length, period=period)
+                )
+        return {name: one for name, one in made.items() if one.predicted.size}
 
     def report_decays(self) -> None:
         """Add frequency, damping and stiffness over inertia of each gear with decays."""
         for gear in self.ratios:
             joint = self.decays.get(gear)
             if joint is None:
-                reason = explain(Code.BUS_NO_DECAY)
                 for stem in (FREQUENCY, DAMPING, SQUARE) if gear in self.refused else ():
-                    self.estimates[make_id(stem, gear)] = refuse(stem, gear, reason)
+                    one = refuse(stem, gear, self.refused[gear])
+                    self.estimates[one.id] = one
                 continue
             note = explain(Code.BUS_K_OVER_J)
             for stem, (value, std), text in (

@@ -29,7 +29,7 @@ SETTINGS = ShiftSettings(ratio_tolerance=0.02)
 _MIN_SAMPLES = 20
 """Fewest samples of a stretch in which a gear is looked for: 0.2 s of a message of 10 ms, about the
 shortest gear held."""
-_CLOSED = 0.02
+CLOSED = 0.02
 """Slip of the clutch over the input speed up to which it counts as closed [ratio]: as far as a
 swinging driveline moves a ratio (`SETTINGS`)."""
 _FLAG_REACH = 1.0
@@ -111,18 +111,23 @@ def find_timeline(log: BusLog, ratios: Mapping[str, float], late: Mapping[str, f
         speeds = sample_speeds(log, stretch, late.get("output_speed", 0.0))
         if speeds.time.size < _MIN_SAMPLES:
             continue
-        runs = [one for one in detect_gear_runs(speeds, ratios, SETTINGS) if one.gear is not None]
+        runs = _merge(detect_gear_runs(speeds, ratios, SETTINGS))
         part = _Part(log, speeds, ratios, late.get("engine_speed", 0.0))
-        found = part.list_shifts(_merge(runs))
+        found = part.list_shifts(runs)
         shifts += found
-        held += part.list_held(_merge(runs), found)
+        held += part.list_held(runs, found)
     return Timeline(log, tuple(held), tuple(shifts))
 
 
 def _merge(runs: Sequence[Run]) -> list[Run]:
-    """Join runs of one gear: a gear that slips and is held again does not change."""
+    """Join runs of one gear without those of no gear.
+
+    A gear that slips and is held again does not change.
+    """
     merged: list[Run] = []
     for run in runs:
+        if run.gear is None:
+            continue
         if merged and merged[-1].gear == run.gear:
             merged[-1] = Run(run.gear, merged[-1].first, run.last)
         else:
@@ -141,7 +146,7 @@ class _Slip:
     @property
     def is_open(self) -> NDArray[np.bool_]:
         """Samples (n,) at which the clutch slips."""
-        return np.asarray(np.abs(self.values) > _CLOSED * self.inlet)
+        return np.asarray(np.abs(self.values) > CLOSED * self.inlet)
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,7 +73,8 @@ def average_neighbours(samples: FloatArray, width: int) -> FloatArray:
 class BusLog:
     """One bus log: `signals` by role, `gear` steps and `flags` (spans [s] of the shift flag).
 
-    `stretches` [s] are the parts in which both gearbox speeds are recorded without a gap.
+    `stretches` [s] are the parts in which both gearbox speeds are recorded without a gap. With a
+    `converter`, speed and torque of the engine are left out.
     """
 
     label: str
@@ -82,6 +83,7 @@ class BusLog:
     flags: tuple[Span, ...] | None
     stretches: tuple[Span, ...]
     source: str = ""
+    converter: bool = False
 
     def get_gear_value(self, time: float) -> str:
         """Gear on the bus at `time` [s]; empty if it is not recorded."""

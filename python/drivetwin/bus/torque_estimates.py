@@ -84,7 +84,8 @@ def estimate_torques(
 ) -> TorqueResults:
     """Estimate all that the engine torque determines; without one, each has its reason."""
     if not any("engine_torque" in line.log.signals for line in lines):
-        reason = explain(Code.BUS_NO_TORQUE)
+        converter = any(line.log.converter for line in lines)
+        reason = explain(Code.BUS_TORQUE_OF_CONVERTER if converter else Code.BUS_NO_TORQUE)
         return TorqueResults({make_id(one): refuse(one, "", reason) for one in _ALL})
     estimates: dict[str, Estimate] = {}
     balances: dict[str, TorqueBalance] = {}

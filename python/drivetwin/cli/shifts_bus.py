@@ -21,7 +21,7 @@ def show_bus_shifts(log: Path, vehicle: Path, channels: Path | None, *, as_json:
 
     Raises the typed errors of the readers.
     """
-    from drivetwin.bus.identify import find_limits, find_shifts
+    from drivetwin.bus.identify import find_shifts
     from drivetwin.files.bus_file import build_shift_record
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.read import read_log
@@ -31,8 +31,8 @@ def show_bus_shifts(log: Path, vehicle: Path, channels: Path | None, *, as_json:
     card = load_ratio_card(vehicle)
     with show_step(f"reading {log.name}"):
         recording = read_log(log, None, find_mapping(channels, log))
-        found = find_shifts(recording, card)
-    findings = (*recording.findings, *find_limits(found))
+        found, remarks = find_shifts(recording, card)
+    findings = (*recording.findings, *remarks)
     if as_json:
         shifts = [build_shift_record(found.log.label, one) for one in found.shifts]
         records = [one.model_dump(mode="json", by_alias=True) for one in shifts]

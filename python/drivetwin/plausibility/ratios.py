@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,11 +31,11 @@ class HeldRatio:
     std: float
 
 
-def find_held_ratios(speeds: GearboxSpeeds) -> list[HeldRatio]:
+def find_held_ratios(speeds: GearboxSpeeds, hold: float = PLAUSIBILITY.hold) -> list[HeldRatio]:
     """Find the ratios that the speeds hold, from high to low, without knowledge of the gears.
 
     Blocks of `WIDTH` are reduced to their ratio; neighbours of one ratio within half of the
-    tolerance make a run, and runs of `hold` and more count.
+    tolerance make a run, and runs of `hold` [s] and more count.
     """
     usual = PLAUSIBILITY
     size = max(2, speeds.count_samples(WIDTH, 2))
@@ -54,15 +54,16 @@ def find_held_ratios(speeds: GearboxSpeeds) -> list[HeldRatio]:
         if stop < count and abs(ratio[stop] / ratio[start] - 1) < 0.5 * usual.ratio_tolerance:
             continue
         run = ratio[start:stop]
-        if run.size * period >= usual.hold and np.isfinite(run).all() and run[0] > 0.0:
+        if run.size * period >= hold and np.isfinite(run).all() and run[0] > 0.0:
             # The median of normal values scatters by √(π/2) times their mean.
             std = float(np.sqrt(0.5 * np.pi) * np.std(run, ddof=1) / np.sqrt(run.size))
             found.append(HeldRatio(float(np.median(run)), run.size * period, std))
         start = stop
-    return _merge_equal(found)
+    return merge_equal_ratios(found)
 
 
-def _merge_equal(found: Sequence[HeldRatio]) -> list[HeldRatio]:
+def merge_equal_ratios(found: Iterable[HeldRatio]) -> list[HeldRatio]:
+    """Merge ratios that differ by less than the tolerance; from high to low."""
     merged: list[HeldRatio] = []
     for one in sorted(found, key=lambda each: -each.ratio):
         last = merged[-1] if merged else None

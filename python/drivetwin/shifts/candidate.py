@@ -77,6 +77,8 @@ def _classify_samples(
     ratio = median_filter(speeds.input, _SPIKE, mode="nearest")
     output = median_filter(speeds.output, _SPIKE, mode="nearest")
     moving = output > settings.min_output_speed
+    if not ratios:
+        return np.where(moving, _NONE, _STANDING).astype(np.int64)
     ratio = np.divide(ratio, output, out=np.zeros_like(ratio), where=moving)
     gears = np.array(ratios)
     distance = np.abs(ratio[:, None] / gears[None, :] - 1.0)
