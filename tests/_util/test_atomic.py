@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,18 @@ def test_a_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
     with pytest.raises(UnicodeEncodeError):
         write_text(path, "long text before the fault \ud800")
     assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_threads_that_write_one_file_leave_it_whole(tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    texts = [f"{k}" * 300_000 for k in range(4)]
+    write_text(path, texts[0])
+    with ThreadPoolExecutor(len(texts)) as pool:
+        written = [pool.submit(write_text, path, text) for text in 10 * texts]
+        while not all(one.done() for one in written):
+            assert path.read_text() in texts
+    assert [one.result() for one in written] == [None] * len(written)
     assert list(tmp_path.iterdir()) == [path]
 
 

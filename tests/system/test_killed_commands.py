@@ -250,8 +250,8 @@ def test_the_next_run_removes_what_a_kill_left(folder: Path, tmp_path: Path) -> 
     with subprocess.Popen([sys.executable, "-c", ""]) as ended:
         ended.wait()
     gone, here = f"{platform.node()}.{ended.pid}", f"{platform.node()}.{os.getpid()}"
-    left = [tmp_path / f".drivetwin-{gone}.abc", tmp_path / f"out.resume.json.{gone}.partial"]
-    kept = [tmp_path / f".drivetwin-{here}.abc", tmp_path / f"mine.{here}.partial"]
+    left = [tmp_path / f".drivetwin-{gone}.abc", tmp_path / f"out.resume.json.{gone}.ab12.partial"]
+    kept = [tmp_path / f".drivetwin-{here}.abc", tmp_path / f"mine.{here}.ab12.partial"]
     for folder_left, file_left in (left, kept):
         (folder_left / "sub").mkdir(parents=True)
         file_left.write_text("half")

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import platform
 import re
+import secrets
 import shutil
 import stat
 from collections.abc import Iterable, Iterator
@@ -22,6 +23,8 @@ _Identity = tuple[int, int]
 
 FOLDER_PREFIX = ".drivetwin-"
 """First part of the names of unfinished folders."""
+_TOKEN = 6
+"""Random bytes in the name of an unfinished file; exclusive creation fails on a repeated name."""
 _kept: ContextVar[frozenset[_Identity]] = ContextVar("kept", default=frozenset())
 
 
@@ -66,17 +69,20 @@ def _get_identity(path: Path) -> _Identity | None:
 def open_atomic(path: Path | str) -> Iterator[BinaryIO]:
     """Open a file beside `path` to write into; it is renamed into place when the block succeeds.
 
-    A block that fails or is stopped leaves the old file, never half of the new one; several
-    machines may write the same file. Raises OSError, and InputError where `path` is to be kept.
+    A block that fails or is stopped leaves the old file, never half of the new one. Several
+    threads, processes and machines may write the same file: the last one to finish wins. Raises
+    OSError, and InputError where `path` is to be kept.
     """
     path = Path(path)
     refuse_overwrite(path)
     if not path.name:
         raise InputError("this names no file to write to", "name a file", Where(file=str(path)))
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f"{path.name}.{make_owner_name()}.partial")
+    own = f"{make_owner_name()}.{secrets.token_hex(_TOKEN)}"  # of this call: threads share a process
+    beside = path.with_name(f"{path.name}.{own}.partial")
+    unfinished = beside.open("x+b")
     try:
-        with beside.open("w+b") as file:
+        with unfinished as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -98,7 +104,7 @@ def remove_unfinished(outputs: Iterable[Path]) -> None:
     if os.name != "posix":
         return  # elsewhere a process cannot be looked up by its number
     owner = rf"{re.escape(platform.node())}\.(\d{{1,9}})"
-    unfinished = re.compile(rf".+\.{owner}\.partial|{re.escape(FOLDER_PREFIX)}{owner}\..+")
+    unfinished = re.compile(rf".+\.{owner}\.\w+\.partial|{re.escape(FOLDER_PREFIX)}{owner}\..+")
     for folder in {one for path in outputs for one in (find_existing(path), path.parent)}:
         for path in folder.iterdir() if folder.is_dir() else ():
             found = unfinished.fullmatch(path.name)
