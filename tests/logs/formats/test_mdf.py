@@ -277,16 +277,16 @@ def converted(folder: Path, codes: NDArray[Any], conversion: dict[str, Any]) -> 
         {"lower_0": 65000, "upper_0": NOT_AVAILABLE, "text_0": b"error"},
     ],
 )
-@pytest.mark.parametrize("missing", [slice(3, 6), slice(None)])
-def test_a_text_among_numbers_is_no_number(
-    table: dict[str, Any], missing: slice, tmp_path: Path
-) -> None:
+def test_a_text_among_numbers_is_no_sample(table: dict[str, Any], tmp_path: Path) -> None:
     codes = np.arange(1500, 1700).astype(np.uint16)
-    codes[missing] = NOT_AVAILABLE
+    codes[3:6] = NOT_AVAILABLE
     default = asammdf.blocks.conversion_utils.from_dict(LINEAR)
     found = converted(tmp_path, codes, {**table, "default_addr": default})
-    expected = np.where(codes == NOT_AVAILABLE, np.nan, 0.125 * codes + 10.0)
-    np.testing.assert_array_equal(found.values, expected)
+    valid = codes != NOT_AVAILABLE
+    np.testing.assert_array_equal(found.values, 0.125 * codes[valid] + 10.0)
+    np.testing.assert_array_equal(found.time, 0.01 * np.flatnonzero(valid))
+    text = table["text_0"].decode()
+    assert found.notes == (f"3 {text!r} of 200 samples left out: by its text the code is no value",)
 
 
 def test_the_texts_of_codes_are_told(tmp_path: Path) -> None:

@@ -25,8 +25,14 @@ from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
 from drivetwin.logs.formats.can.mdf_frames import has_only_frames, read_bus_frames
 from drivetwin.logs.formats.can.open import decode_recording
-from drivetwin.logs.formats.cell_text import parse_numbers, select_numbers
 from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.mdf_conversion import (
+    ConversionError,
+    Converted,
+    convert_numbers,
+    convert_samples,
+    convert_texts,
+)
 from drivetwin.logs.formats.mdf_integrity import MOST_INFLATION, check_blocks
 from drivetwin.logs.raw import (
     Joined,
@@ -51,10 +57,8 @@ _MOST_KEPT = 1 << 30
 _FINISHED = b"MDF     "
 _OPTIONS = {"process_bus_logging": False, "use_display_names": False}
 
-_LISTED = 8
-"""Largest number of texts of a table that are listed."""
-
-_MASTERS = (2, 3)
+_COUNTED = 3
+_MASTERS = (2, _COUNTED)
 """Types of a channel of MDF 4 over which its group is recorded: stored, or counted."""
 
 _TIME, _NO_TIME = 1, (2, 3, 4)
@@ -184,6 +188,7 @@ class MdfRecording:
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one channel, in a window only the records inside; see `Recording`."""
         place, column = self._places[index], self.columns[index]
+        where = Where(file=str(self._path), channel=str(column))
         with handle_parser_errors(KIND, self._path):
             time = self._load_stamps(place.group)
             first, count = 0, time.size
@@ -192,27 +197,31 @@ class MdfRecording:
                 last += int(last < time.size and time[last] == window[1])
                 count = int(last - first)
                 time = time[first:last]
-            values, invalid, codes = self._load_samples(place, int(first), count)
-        where = Where(file=str(self._path), channel=str(column))
-        if values.dtype.kind not in "iufb" or values.ndim != 1:
-            raise DamagedChannelError(
-                "it holds text or arrays, one number for each sample is needed",
-                "map another channel",
-                where,
-            )
-        if values.size != time.size:
+            try:
+                converted, invalid = self._load_samples(place, int(first), count)
+            except ConversionError as fault:
+                remedy = "export the log with physical values, or map another channel"
+                raise DamagedChannelError(str(fault), remedy, where) from None
+        numbers, left_out = converted.values, converted.left_out
+        numbers = numbers.astype(np.float64, copy=not numbers.flags.owndata)
+        if numbers.size != time.size:
             raise FileFormatError(
-                f"{values.size} values for {time.size} time stamps", "record the log again", where
+                f"{numbers.size} values for {time.size} time stamps", "record the log again", where
             )
-        numbers = values.astype(np.float64, copy=not values.flags.owndata)
-        notes = (codes,) if codes else ()
+        notes = converted.notes
         if invalid is not None and invalid.any():
             if invalid.all():
                 what = f"the recorder marks all {invalid.size} samples invalid"
                 raise DamagedChannelError(what, "map another channel", where)
-            left = f"{int(invalid.sum())} samples that the recorder marks invalid left out"
-            notes = (*notes, left)
-            time, numbers = time[~invalid], numbers[~invalid]
+            notes = (
+                *notes,
+                f"{int(invalid.sum())} samples that the recorder marks invalid left out",
+            )
+            left_out = invalid if left_out is None else left_out | invalid
+        if left_out is not None and left_out.any():
+            if left_out.all():
+                raise DamagedChannelError("; ".join(notes), "map another channel", where)
+            time, numbers = time[~left_out], numbers[~left_out]
         return RawChannel(column.name, column.unit, time, numbers, column.group, notes)
 
     def _detect_origin(self) -> float:
@@ -225,24 +234,35 @@ class MdfRecording:
         """Yield the first stamp [s] of each group; damaged groups fail later, when loaded."""
         for number, factor in self._factors.items():
             with contextlib.suppress(Exception):
-                first = self._mdf.get_master(number, record_offset=0, record_count=1)
-                yield from np.asarray(first, dtype=np.float64) * factor
+                yield from self._read_master(number, record_offset=0, record_count=1) * factor
+
+    def _read_master(self, number: int, **records: int) -> FloatArray:
+        """Return the stamps (n,) of a group in the unit of its time channel."""
+        index = self._mdf.masters_db[number]
+        channel = self._mdf.groups[number].channels[index]
+        if channel.conversion is None or channel.channel_type == _COUNTED:
+            return np.asarray(self._mdf.get_master(number, **records), dtype=np.float64)
+        raw, _ = self._mdf.get(
+            group=number,
+            index=index,
+            raw=True,
+            samples_only=True,
+            ignore_invalidation_bits=True,
+            **records,
+        )
+        return convert_numbers(raw, channel.conversion, self._path)
 
     def _load_stamps(self, group: int) -> FloatArray:
         """Return the stamps [s] of a group; the stamps of the last group are cached."""
         if self._stamps is None or self._stamps[0] != group:
-            master = np.asarray(self._mdf.get_master(group), dtype=np.float64)
+            master = self._read_master(group)
             if self._factors[group] != 1.0:
                 master = master * self._factors[group]
             self._stamps = (group, subtract_origin(master, self.origin))
         return self._stamps[1]
 
-    def _load_samples(self, place: _Place, first: int, count: int) -> tuple[Any, Any, str]:
-        """Values with the conversion of the file, the recorder's marks for invalid ones, a note.
-
-        A text among numbers, such as `not available`, becomes NaN. Texts that are numbers are the
-        values. If no text is a number, the codes are returned, and the note lists the texts.
-        """
+    def _load_samples(self, place: _Place, first: int, count: int) -> tuple[Converted, Any]:
+        """Values with the conversion of the file, and the recorder's marks for invalid ones."""
         wanted = {
             "group": place.group,
             "index": place.index,
@@ -257,37 +277,18 @@ class MdfRecording:
         if whole and _KEPT_FROM * self._loaded[place.group] >= len(group.channels):
             self._records.keep(group)
         channel = group.channels[place.index]
-        formula = getattr(channel.conversion, "formula", "")
-        note = ""
-        samples, marks = self._mdf.get(raw=bool(formula), **wanted)
-        if formula:
-            samples = self._evaluate_formula(formula, samples, channel.name)
-        elif samples.dtype.kind in "SUO" or _has_texts(channel.conversion):
-            codes, _ = self._mdf.get(raw=True, **wanted)
-            samples, note = _convert_texts(samples, codes, channel.conversion)
+        raw, marks = self._mdf.get(raw=True, **wanted)
         if getattr(channel, "flags", 0) & _ALL_INVALID:
-            marks = np.ones(len(samples), dtype=np.bool_)
-        return samples, None if marks is None else np.asarray(marks, dtype=np.bool_), note
-
-    def _evaluate_formula(self, formula: str, raw: Any, name: str) -> Any:
-        """The physical values (n,) of a formula over the raw ones `X`, also named `X1`.
-
-        asammdf takes raw values for physical ones where it cannot evaluate a formula, and computes
-        with integers where they are, which overflow.
-        """
-        numexpr = import_extra("numexpr", "mdf", KIND, self._path)
-        try:
-            numbers = np.asarray(raw, dtype=np.float64)
-            names = {"X": numbers, "X1": numbers, "INF": np.inf, "NaN": np.nan}
-            return np.broadcast_to(
-                numexpr.evaluate(formula, names, {}, sanitize=True), numbers.shape
-            )
-        except Exception:
-            raise DamagedChannelError(
-                f"its formula {formula!r} is none that can be evaluated",
-                "export the log with physical values, or map another channel",
-                Where(file=str(self._path), channel=name),
-            ) from None
+            marks = np.ones(len(raw), dtype=np.bool_)
+        marks = None if marks is None else np.asarray(marks, dtype=np.bool_)
+        if raw.ndim == 1 and raw.dtype.kind in "iufb":
+            return convert_samples(raw, channel.conversion, self._path), marks
+        found = None
+        if raw.ndim == 1 and raw.dtype.kind in "SUO":
+            found = convert_texts(raw, self._mdf.get(raw=False, **wanted)[0])
+        if found is None:
+            raise ConversionError("it holds text or arrays, one number for each sample is needed")
+        return found, marks
 
     def _check_size(self, group: Any, name: str) -> None:
         """Refuse a group that claims more records than the file can hold, before it is loaded."""
@@ -362,81 +363,3 @@ def _get_group_name(block: Any) -> str:
     name = str(getattr(block, "acq_name", "") or "").strip()
     comment = str(block.comment or "").strip()
     return name or ("" if comment.startswith("<") else comment.partition("\n")[0])
-
-
-def _has_texts(conversion: Any) -> bool:
-    """Return True if a conversion gives a text for some codes."""
-    blocks = getattr(conversion, "referenced_blocks", None) or {}
-    return any(isinstance(text, bytes) and text for text in blocks.values())
-
-
-def _has_numeric_codes(conversion: Any) -> bool:
-    """Return True if a value-to-text conversion also has numeric values."""
-    blocks = getattr(conversion, "referenced_blocks", None) or {}
-    return any(hasattr(block, "convert") for block in blocks.values())
-
-
-def _convert_texts(samples: Any, codes: Any, conversion: Any) -> tuple[Any, str]:
-    """Return the values (n,) that samples with texts stand for, and a note; see `_load_samples`.
-
-    Texts come from the table of the conversion: of an unsorted one of MDF 3 asammdf finds few.
-    """
-    if samples.ndim != 1 or codes.ndim != 1:
-        return samples, ""
-    is_coded = codes.dtype.kind in "iufb"
-    if is_coded:
-        known, place = np.unique(codes, return_inverse=True)
-        texts = _look_up_texts(conversion, known)
-    else:
-        listed, place = np.unique(samples, return_inverse=True)
-        known = np.full(listed.size, np.nan)
-        texts = [_decode_text(one) for one in listed.tolist()]
-    if samples.dtype.kind not in "SUO":
-        is_text = np.array([text is not None for text in texts])
-        numbers = parse_numbers(text or "" for text in texts)
-        return np.where(is_text[place], numbers[place], samples), ""
-    found = select_numbers([text or "" for text in texts], known.astype(np.float64))
-    if found is not None:
-        return found.values[place], found.note
-    if _has_numeric_codes(conversion):
-        return np.full(samples.shape, np.nan), ""
-    return codes, _describe_codes(conversion)
-
-
-def _look_up_texts(conversion: Any, codes: Any) -> list[str | None]:
-    """Return the text of each code (n,) by the table of a conversion; None for a number."""
-    blocks = getattr(conversion, "referenced_blocks", None) or {}
-    default = blocks.get("default_addr")
-    is_text = isinstance(default, bytes) and b"{X}" not in default  # MDF 3: a formula as text
-    rest = _decode_text(default) if is_text else None
-    found: list[str | None] = [rest for _ in codes]
-    free = np.ones(codes.size, np.bool_)
-    for number in range(max(len(blocks), getattr(conversion, "ref_param_nr", 0))):
-        text = blocks.get(f"text_{number}", getattr(conversion, f"text_{number}", None))
-        value = getattr(conversion, f"val_{number}", None)
-        value = getattr(conversion, f"param_val_{number}", value)
-        low, high = (getattr(conversion, f"{end}_{number}", value) for end in ("lower", "upper"))
-        if text is None or low is None or high is None:
-            continue
-        below = codes < high if codes.dtype.kind == "f" else codes <= high
-        inside = free & (codes >= low) & (below | (codes == low))
-        free &= ~inside
-        for index in np.flatnonzero(inside).tolist():
-            found[index] = _decode_text(text) if isinstance(text, bytes) else None
-    return found
-
-
-def _decode_text(text: Any) -> str:
-    return text.decode("utf-8", "replace").strip("\0") if isinstance(text, bytes) else str(text)
-
-
-def _describe_codes(conversion: Any) -> str:
-    """Words for a table of texts: `codes of texts: 0 = off, 1 = on`."""
-    blocks = getattr(conversion, "referenced_blocks", None) or {}
-    pairs = []
-    for index in range(_LISTED):
-        text = blocks.get(f"text_{index}")
-        code = getattr(conversion, f"val_{index}", getattr(conversion, f"lower_{index}", None))
-        if isinstance(text, bytes) and code is not None:
-            pairs.append(f"{code:g} = {_decode_text(text)}")
-    return f"codes of texts: {', '.join(pairs)}" if pairs else ""

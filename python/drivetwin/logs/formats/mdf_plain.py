@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivetwin._util.optional_dependencies import handle_parser_errors
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.logs.formats.can.mdf_frames import has_only_frames
 from drivetwin.logs.formats.mdf import KIND, MdfRecording
+from drivetwin.logs.formats.mdf_conversion import scale_linear
 from drivetwin.logs.formats.mdf_integrity import HEADER4, Block, find_problems, parse_block
 from drivetwin.logs.raw import Recording
 
@@ -59,7 +59,7 @@ class _Channel:
     """A channel, with the attributes of asammdf that `MdfRecording` reads.
 
     Its values are `scale` times the number of type `dtype` at byte `offset` of a record, plus
-    `shift`.
+    `shift`; they come converted, so that no `conversion` remains.
     """
 
     name: str
@@ -71,13 +71,6 @@ class _Channel:
     scale: float = 1.0
     shift: float = 0.0
     conversion: None = None
-
-    def convert(self, numbers: NDArray[Any]) -> NDArray[Any]:
-        """Return the values (n,) of numbers (n,), in the precision in which asammdf computes."""
-        if (self.scale, self.shift) == (1.0, 0.0):
-            return numbers
-        values = numbers * self.scale
-        return values + self.shift if self.shift else values
 
 
 @dataclass(frozen=True)
@@ -164,7 +157,9 @@ class _PlainFile:
                 high = min(low + step, end)
                 self._file.seek(place + (low - start) * width)
                 numbers = np.fromfile(self._file, record, high - low)["x"]
-                values[low:high] = channel.convert(numbers)
+                values[low:high] = scale_linear(
+                    numbers.astype(np.float64), channel.scale, channel.shift
+                )
             start += held
         return values, None
 

@@ -34,6 +34,10 @@ def test_codes_of_two_bits_follow_the_limits(
     assert counts(Signal("x", 0, 2, limits=limits), 0, 1, 2, 3) == expected
 
 
+def test_a_single_bit_has_no_code_for_not_available() -> None:
+    assert counts(Signal("x", 0, 1), 0, 1) == (2, 0, 0, 0)
+
+
 def test_limits_of_a_scaled_signal_include_their_ends() -> None:
     percent = Signal("x", 0, 8, scale=1.0, offset=-125.0, limits=(-125.0, 125.0))
     assert counts(percent, 0, 125, 250) == (3, 0, 0, 0)

@@ -6,6 +6,7 @@ The messages of engine and gearbox are built in and need no library.
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Sequence
 from functools import cache
@@ -20,7 +21,7 @@ from drivetwin._util.optional_dependencies import handle_parser_errors, import_e
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.cell_text import select_numbers
+from drivetwin.logs.formats.code_texts import CodeValues, interpret_codes
 from drivetwin.logs.formats.frames import EXTENDED_BIT, Message, Signal
 
 Bytes = NDArray[np.uint8]
@@ -35,13 +36,29 @@ def read_database(paths: Sequence[Path]) -> tuple[Message, ...]:
     """
     messages: list[Message] = []
     for path in paths:
-        cantools = import_extra("cantools.database", "can", "decoding a bus log", path)
+        import_extra("cantools.database", "can", "decoding a bus log", path)
         measure_regular_file(path, FileFormatError, "correct dbc under [bus]", LARGEST_RECORD)
         with handle_parser_errors("a DBC file", path):
-            text = path.read_text(encoding="cp1252", errors="replace")
-            content = cantools.load_string(text, "dbc", strict=False)
-            messages += [_convert_message(one) for one in content.messages]
+            messages += parse_database(path.read_bytes(), path)
     return tuple(messages)
+
+
+def parse_database(data: bytes, path: Path) -> list[Message]:
+    """Parse the bytes of a DBC file that errors name `path`; raises as `read_database`."""
+    cantools = import_extra("cantools.database", "can", "decoding a bus log", path)
+    with handle_parser_errors("a DBC file", path):
+        content = cantools.load_string(_decode_text(data), "dbc", strict=False)
+        return [_convert_message(one) for one in content.messages]
+
+
+def _decode_text(data: bytes) -> str:
+    """Text of a database: UTF-8 with or without a mark, or cp1252, as older tools write it."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
 
 
 def list_databases(log: Path) -> list[str]:
@@ -108,26 +125,50 @@ def decode_physical(data: Bytes, signal: Signal) -> FloatArray:
     """Return the values (n,) of a signal in its unit; ValueError as in `decode_codes`.
 
     Texts of the database that are numbers are the values of their codes, NaN where others beside
-    them are none.
+    them are none. A code whose text is a fault has no value: NaN.
     """
     if signal.is_float:
-        return signal.scale * _decode_floats(data, signal) + signal.offset
-    raw = decode_codes(data, signal)
-    if signal.signed:
-        raw = np.where(raw >> (signal.length - 1), raw - (1 << signal.length), raw)
-    values = signal.scale * raw.astype(np.float64) + signal.offset
-    named = _find_number_texts(signal)
-    for code, number in zip((code for code, _ in signal.texts), named, strict=False):
-        values[raw == code] = number
+        raw = _decode_floats(data, signal)
+    else:
+        codes = decode_codes(data, signal)
+        negative = signal.signed & (codes >> (signal.length - 1))
+        raw = (codes - (negative << signal.length)).astype(np.float64)
+    values = signal.scale * raw + signal.offset
+    if signal.texts:
+        place, named = find_named_codes(data, signal), _interpret_texts(signal)
+        values = np.where(place < 0, values, named.values[place])
     return values
 
 
-def _find_number_texts(signal: Signal) -> FloatArray:
-    """Return the value of each named code, NaN without one; empty where names are no values."""
+def find_named_codes(data: Bytes, signal: Signal) -> NDArray[np.intp]:
+    """Return the place (n,) of each code among the texts of a signal, -1 for codes without one.
+
+    A database may state the code of a negative number with or without its sign.
+    """
+    wanted = [code for code, _ in signal.texts]
+    if signal.is_float:
+        raw: NDArray[Any] = _decode_floats(data, signal)
+    else:
+        raw = decode_codes(data, signal)
+        wanted = [code & ((1 << signal.length) - 1) for code in wanted]
+    place = np.full(len(data), -1, np.intp)
+    for number, code in enumerate(wanted):
+        place[raw == code] = number
+    return place
+
+
+def find_faults(data: Bytes, signal: Signal) -> NDArray[np.intp]:
+    """Return, as `find_named_codes`, the places of the texts that are faults alone."""
+    place = find_named_codes(data, signal)
+    return np.where(_interpret_texts(signal).faults[place], place, -1) if signal.texts else place
+
+
+@cache
+def _interpret_texts(signal: Signal) -> CodeValues:
     codes = np.array([code for code, _ in signal.texts], np.float64)
-    physical = signal.scale * codes + signal.offset
-    found = select_numbers([text for _, text in signal.texts], physical)
-    return np.empty(0) if found is None else found.values
+    if signal.signed and not signal.is_float:
+        codes = np.where(codes >= 1 << (signal.length - 1), codes - (1 << signal.length), codes)
+    return interpret_codes([text for _, text in signal.texts], signal.scale * codes + signal.offset)
 
 
 def _decode_floats(data: Bytes, signal: Signal) -> FloatArray:

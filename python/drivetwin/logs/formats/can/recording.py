@@ -17,10 +17,12 @@ from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
 from drivetwin.logs.formats.can.database import (
     decode_codes,
     decode_physical,
+    find_faults,
     list_databases,
     select_addressed_payloads,
     select_valid_payloads,
 )
+from drivetwin.logs.formats.code_texts import describe_faults
 from drivetwin.logs.formats.frames import Frames, Message, Signal
 from drivetwin.logs.formats.j1939 import torque
 from drivetwin.logs.formats.j1939.codes import check_codes
@@ -132,15 +134,14 @@ class BusRecording:
             if check.note:
                 notes.append(check.note)
             there[there] = check.valid
-        named = there & np.isnan(values) if signal.texts else np.zeros_like(there)
-        if named.any():
-            notes.append(f"{int(named.sum())} samples whose text is no number left out")
-            there &= ~named
+        if signal.texts:
+            there, named = _drop_named(track, signal, there, values)
+            notes += named
         there, order = _select_ordered(track, there, where)
         notes += order
         if not there.any():
             raise DamagedChannelError(
-                notes[0] if notes else "no frame holds this signal", "map another channel", where
+                "; ".join(notes) or "no frame holds this signal", "map another channel", where
             )
         return RawChannel(
             signal.name, signal.unit, track.time[there], values[there], track.group, tuple(notes)
@@ -224,6 +225,21 @@ class BusRecording:
             "percent torque stays in percent, the bus has no reference torque (EC1); state it in "
             "the channel mapping: bus = { reference_torque_Nm = ... }"
         )
+
+
+def _drop_named(
+    track: Track, signal: Signal, there: NDArray[np.bool_], values: FloatArray
+) -> tuple[NDArray[np.bool_], list[str]]:
+    """Select the frames (n,) that are `there` and no fault or other text; return also the notes."""
+    faults = np.where(there, find_faults(track.data, signal), -1)
+    texts = [text for _, text in signal.texts]
+    counts = np.bincount(faults[faults >= 0], minlength=len(texts)).tolist()
+    notes = [describe_faults(texts, counts, int(there.sum()))]
+    there = there & (faults < 0)
+    lost = there & np.isnan(values)
+    if lost.any():
+        notes.append(f"{int(lost.sum())} samples whose text is no number left out")
+    return there & ~lost, [note for note in notes if note]
 
 
 def _make_marked_column(entry: _Entry) -> Column:

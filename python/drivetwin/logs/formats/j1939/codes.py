@@ -41,11 +41,11 @@ class CodeCheck:
 def check_codes(raw: NDArray[np.int64], values: FloatArray, signal: Signal) -> CodeCheck:
     """Classify codes `raw` (n,), whose values (n,) are in the signal's unit.
 
-    All bits set: not available. From one byte on, a first byte of 0xFE is an error and 0xFB to 0xFD
-    are reserved. Else the limits that the database states decide; they come first, because some
-    short signals use all their codes.
+    All bits set: not available; a single bit has no code for that. From one byte on, a first byte
+    of 0xFE is an error and 0xFB to 0xFD are reserved. Else the limits that the database states
+    decide; they come first, because some short signals use all their codes.
     """
-    all_set = raw == (1 << signal.length) - 1
+    all_set = (raw == (1 << signal.length) - 1) & (signal.length > 1)
     if signal.length >= _BYTE:
         top = raw >> (signal.length - _BYTE)
         absent, error = top == 0xFF, top == _ERROR
