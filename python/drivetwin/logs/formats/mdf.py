@@ -64,6 +64,9 @@ _MASTERS = (2, _COUNTED)
 _TIME, _NO_TIME = 1, (2, 3, 4)
 """Contents of a master channel: time; angle, distance or index."""
 
+_INTEGERS = (0, 1, 2, 3)
+"""Types of raw samples of MDF 4: integers, with and without sign, in both byte orders."""
+
 _ALL_INVALID = 1
 """Flag of a channel of MDF 4 none of whose samples is valid."""
 
@@ -281,6 +284,8 @@ class MdfRecording:
         if getattr(channel, "flags", 0) & _ALL_INVALID:
             marks = np.ones(len(raw), dtype=np.bool_)
         marks = None if marks is None else np.asarray(marks, dtype=np.bool_)
+        if raw.dtype.kind == "f" and _has_integers(channel):
+            raw = raw.astype(np.int64)  # as asammdf returns integers of 5 to 7 bytes with a sign
         if raw.ndim == 1 and raw.dtype.kind in "iufb":
             return convert_samples(raw, channel.conversion, self._path), marks
         found = None
@@ -347,6 +352,11 @@ def _find_time_channel(group: Any, found: int | None) -> int | None:
     )
     over_time = getattr(group.channels[found], "sync_type", _TIME) not in _NO_TIME
     return found if over_time else next(times, None)
+
+
+def _has_integers(channel: Any) -> bool:
+    """Return True for a channel of MDF 4 whose raw samples are integers."""
+    return hasattr(channel, "sync_type") and getattr(channel, "data_type", None) in _INTEGERS
 
 
 def _make_group_names(groups: Sequence[Any]) -> list[str]:
