@@ -276,9 +276,9 @@ class _Writer:
             places.append(place)
             right = valid if made.faults is None else valid & ~made.faults
             self.known[name] = Known(time, made.values, right, f"{kind} of {one.raw.dtype}")
-        name = out.add_text(f"group {number}") if out.chance(0.5) else 0
+        label = out.add_text(f"group {number}") if out.chance(0.5) else 0
         body = struct.pack("<QQHH4xII", record_id, count, 0, 0, width, marks)
-        return _Group(out.add(b"##CG", [0, out.chain(places), name, 0, 0, 0], body), records)
+        return _Group(out.add(b"##CG", [0, out.chain(places), label, 0, 0, 0], body), records)
 
     def _add_channel(
         self,

@@ -103,7 +103,8 @@ def check_database(folder: Path, seed: int) -> None:
     text = head + lines + "\n" + "".join(texts)
     dbc, log = folder / "bus.dbc", folder / "bus.log"
     dbc.write_bytes(text.encode(encoding, "replace"))
-    message: Any = cantools.database.load_string(head + lines, "dbc", strict=False).messages[0]
+    database: Any = cantools.database.load_string(head + lines, "dbc", strict=False)
+    message = database.messages[0]
     rows = [
         message.encode({name: one.codes[k] for name, one in cases.items()}, scaling=False).hex()
         for k in range(60)

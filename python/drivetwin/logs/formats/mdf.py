@@ -23,7 +23,11 @@ from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
-from drivetwin.logs.formats.can.mdf_frames import has_only_frames, read_bus_frames
+from drivetwin.logs.formats.can.mdf_frames import (
+    has_only_frames,
+    read_attached_databases,
+    read_bus_frames,
+)
 from drivetwin.logs.formats.can.open import decode_recording
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.mdf_conversion import (
@@ -96,23 +100,31 @@ def open_mdf(path: Path, options: ReadOptions) -> Iterator[Recording]:
             with handle_parser_errors(KIND, path):
                 signals = MdfRecording(mdf, path, options)
                 frames = read_bus_frames(mdf, signals.origin)
-            yield _merge_bus_frames(signals, frames, options, path)
+                attached = {} if frames is None else read_attached_databases(mdf)
+            yield _merge_bus_frames(signals, frames, attached, options, path)
         finally:
             mdf.close()
 
 
 def _merge_bus_frames(
-    signals: MdfRecording, frames: Frames | None, options: ReadOptions, path: Path
+    signals: MdfRecording,
+    frames: Frames | None,
+    attached: dict[str, bytes],
+    options: ReadOptions,
+    path: Path,
 ) -> Recording:
     """The signals of a file and those of its raw frames.
 
-    Frames are decoded where a database is stated or nothing else is in the file: else their signals
-    might stand in it twice. Raises MissingChannelError without any column.
+    Frames are decoded by the databases stated or `attached`, where one is stated or nothing else is
+    in the file: else their signals might stand in it twice. Raises MissingChannelError without any
+    column.
     """
     if frames is not None and (options.bus.databases or not signals.columns):
-        return Joined((signals, decode_recording(frames, options, path)))
+        return Joined((signals, decode_recording(frames, options, path, attached)))
     if frames is not None:
         note = "raw bus frames are not decoded: name their DBC files under [bus]"
+        if attached:
+            note += f"; attached to the file: {', '.join(attached)}"
         signals.warnings = (*signals.warnings, note)
     if not signals.columns:
         raise MissingChannelError(

@@ -119,3 +119,14 @@ def test_frames_from_1970_count_from_the_first_of_the_file(tmp_path: Path) -> No
     for role, channel in expected.channels.items():
         assert found[role].time == pytest.approx(channel.time - start, abs=2e-6)
     assert "time counts from the first stamp" in found.findings[0].text
+
+
+def test_an_attached_database_is_used(tmp_path: Path) -> None:
+    path = write(tmp_path / "bus.mf4", [[(0.01 * k, 0x123, bytes(32)) for k in range(20)]], 32)
+    with asammdf.MDF(path) as mdf:
+        mdf.attach(DBC.encode(), file_name="car.dbc", mime="application/x-dbc")
+        mdf.attach(b"BO_ damaged", file_name="notes.txt", mime="text/plain")
+        path = Path(mdf.save(tmp_path / "attached.mf4", overwrite=True))
+    raw = read_raw(path)
+    assert [(one.name, one.unit, one.time.size) for one in raw.channels] == [("n_ab", "rpm", 20)]
+    assert "frames decoded by the attached database car.dbc" in raw.warnings

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from pathlib import PureWindowsPath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.regular_file import LARGEST_RECORD
 from drivetwin.logs.formats.frames import (
     EXTENDED_BIT,
     FD_LENGTHS,
@@ -21,12 +23,33 @@ DATA_FRAME = "CAN_DataFrame"
 """Name of the record of a data frame; its parts follow after a dot."""
 
 _RECORDS = frozenset(f"CAN_{kind}Frame" for kind in ("Data", "Remote", "Error", "Overload"))
+_EMBEDDED = 1
+"""Flag of an attachment that stands in the file itself."""
+
+_DATABASE_TYPES = ("application/x-dbc", "application/dbc", "text/dbc")
+"""Types by which recorders mark an attached DBC file."""
+
 _LENGTHS = np.array(FD_LENGTHS, np.uint8)
 
 
 def has_only_frames(group: Any) -> bool:
     """Return True if a group of a file holds raw frames and no signals."""
     return any(str(channel.name).partition(".")[0] in _RECORDS for channel in group.channels)
+
+
+def read_attached_databases(mdf: Any) -> dict[str, bytes]:
+    """Return the contents of the DBC files inside a file by their names.
+
+    A file that it only refers to is not looked for.
+    """
+    found: dict[str, bytes] = {}
+    for index, one in enumerate(getattr(mdf, "attachments", ())):
+        name = PureWindowsPath(str(one.file_name)).name  # of either system
+        is_database = name.casefold().endswith(".dbc") or str(one.mime) in _DATABASE_TYPES
+        if not is_database or not one.flags & _EMBEDDED or one.original_size > LARGEST_RECORD:
+            continue
+        found[name or f"attachment {index}"] = bytes(mdf.extract_attachment(index=index)[0])
+    return found
 
 
 def read_bus_frames(mdf: Any, origin: float) -> Frames | None:

@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.logs.formats.can.blf import read_blf
-from drivetwin.logs.formats.can.database import load_driveline_messages, read_database
+from drivetwin.logs.formats.can.database import (
+    load_driveline_messages,
+    parse_database,
+    read_database,
+)
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.texts import read_bus_text
 from drivetwin.logs.formats.frames import Frames
@@ -33,11 +37,26 @@ def open_blf(path: Path, options: ReadOptions) -> Iterator[Recording]:
     yield decode_recording(read_blf(path), options, path)
 
 
-def decode_recording(frames: Frames, options: ReadOptions, path: Path) -> BusRecording:
-    """Decode frames by the databases stated; raises MissingChannelError, MissingExtraError."""
-    stated = (
-        read_database(options.bus.databases) if options.bus.databases else load_driveline_messages()
-    )
-    messages, notes = match_groups(frames, stated, load_driveline_messages)
-    frames = replace(frames, warnings=(*frames.warnings, *notes))
+def decode_recording(
+    frames: Frames, options: ReadOptions, path: Path, attached: Mapping[str, bytes] | None = None
+) -> BusRecording:
+    """Decode frames by the databases stated, else those `attached` to the log, else the built-in.
+
+    `attached` are the contents by name. Raises FileFormatError, MissingChannelError,
+    MissingExtraError.
+    """
+    notes: tuple[str, ...] = ()
+    if options.bus.databases:
+        stated = read_database(options.bus.databases)
+    elif attached:
+        parsed = (
+            parse_database(data, path.with_name(f"{path.name} (attached {name})"))
+            for name, data in attached.items()
+        )
+        stated = tuple(message for one in parsed for message in one)
+        notes = (f"frames decoded by the attached database {', '.join(attached)}",)
+    else:
+        stated = load_driveline_messages()
+    messages, matched = match_groups(frames, stated, load_driveline_messages)
+    frames = replace(frames, warnings=(*frames.warnings, *notes, *matched))
     return BusRecording(frames, messages, options.bus, path)
