@@ -78,7 +78,7 @@ def open_atomic(path: Path | str) -> Iterator[BinaryIO]:
     if not path.name:
         raise InputError("this names no file to write to", "name a file", Where(file=str(path)))
     path.parent.mkdir(parents=True, exist_ok=True)
-    own = f"{make_owner_name()}.{secrets.token_hex(_TOKEN)}"  # of this call: threads share a process
+    own = f"{make_owner_name()}.{secrets.token_hex(_TOKEN)}"
     beside = path.with_name(f"{path.name}.{own}.partial")
     unfinished = beside.open("x+b")
     try:
