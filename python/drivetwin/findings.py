@@ -30,6 +30,7 @@ class Code(StrEnum):
     LOCKUP_DISAGREES = auto()
     COLUMN_AMBIGUOUS = auto()
     NO_PRESSURE = auto()
+    PRESSURE_STEPS = auto()
     OTHER_SENDERS = auto()
     UNIT_OVERRIDDEN = auto()
     CHANNEL_LEFT_OUT = auto()

@@ -11,6 +11,7 @@ import numpy as np
 
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages
+from drivetwin.channels.commands import refuse_commands
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
 from drivetwin.estimation.data.actuators import (
@@ -117,6 +118,7 @@ def identify(
         )
     stages = _BY_METHOD[method]
     with stages.enter("preparation", "preparing the log"):
+        _refuse_commands(log, shifts)
         actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
         prepared = _prepare_checked(log, apply_locks(card, locks), shifts)
     with stages.enter("estimation"):
@@ -157,10 +159,17 @@ def identify_jointly(
     require_compatible(logs)
     with _JOINT.enter("preparation", "preparing the logs"):
         pairs = list(zip(logs, shifts, strict=True))
+        for log, found in pairs:
+            _refuse_commands(log, found)
         actuators = identify_actuators([LogShifts(log, one.shifts) for log, one in pairs], card)
         prepared = [_prepare_checked(log, card, one) for log, one in pairs]
     with _JOINT.enter("estimation"):
         return _attach_actuators(identify_joint(prepared), actuators)
+
+
+def _refuse_commands(log: ShiftLog, found: FoundShifts) -> None:
+    """Raise MissingChannelError if the pressures of the shifts are commands."""
+    refuse_commands(log, [name for one in found.shifts for name in (one.offgoing, one.oncoming)])
 
 
 def _attach_actuators(found: Identification, actuators: FoundActuators) -> Identification:

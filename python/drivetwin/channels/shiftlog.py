@@ -15,7 +15,7 @@ from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.read_options import RememberedMapping
-from drivetwin.channels.roles import Quantity, make_pressure_role
+from drivetwin.channels.roles import Quantity, get_pressure_element, make_pressure_role
 from drivetwin.channels.update_raster import UpdateRaster, find_raster, find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.findings import Finding
@@ -153,6 +153,16 @@ class Channel:
         return () if self.quantity is Quantity.STATE else find_pauses(self.time)
 
 
+def _suggest_channel(role: str) -> str:
+    """Return the remedy for a missing role; a command is not suggested as a pressure."""
+    if get_pressure_element(role) is None:
+        return "name it in a channel mapping file (--channels) or in [channels] of the card"
+    return (
+        "record the pressure at the clutch and name its column in a channel mapping file "
+        "(--channels); a commanded pressure is no measured one"
+    )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ShiftLog(DisplayMixin):
     """All mapped channels of one recording, by role.
@@ -200,7 +210,7 @@ class ShiftLog(DisplayMixin):
             raise MissingChannelError(
                 f"no channel for {role!r}; the log maps {', '.join(sorted(self.channels))}"
                 + ("" if had is None else f"; the twin was identified with {had!r} for {role!r}"),
-                "name it in a channel mapping file (--channels) or in [channels] of the card",
+                _suggest_channel(role),
                 Where(file=self.source),
             ) from None
 

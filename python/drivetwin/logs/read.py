@@ -12,6 +12,7 @@ from pathlib import Path
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin._util.regular_file import compute_digest
+from drivetwin.channels.commands import check_commands
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping
@@ -199,7 +200,7 @@ def assemble_log(
     if card is not None:
         findings += [*check_torque_balance(channels, card), *check_final_drive(channels, card)]
         findings += check_speed_clocks(channels, card)
-    findings += check_torque_delays(channels)
+    findings += [*check_torque_delays(channels), *check_commands(channels)]
     if not stated.options.time.simultaneous:
         channels, late = mark_late_samples(channels)
         findings += late
