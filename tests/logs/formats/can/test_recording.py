@@ -165,13 +165,19 @@ def record(
     return BusRecording(frames, [message], BusOptions(), Path("bus.log"))
 
 
-def test_frames_whose_stamps_run_back_are_left_out_and_counted() -> None:
-    """The frames 10 and 11 come late, behind frame 12."""
+@pytest.mark.parametrize("step", [0.01, 0.0101], ids=["sorted", "left out"])
+def test_frames_that_others_overtook_are_sorted_up_to_20_ms(step: float) -> None:
+    """The frames 10 and 11 come behind frame 12."""
     order = [*range(10), 12, 10, 11, *range(13, 20)]
-    channel = record([0.01 * k for k in order], [bytes([k]) for k in order]).load(0)
-    assert channel.values.tolist() == [*range(10), 12, *range(13, 20)]
+    recording = record([step * k for k in order], [bytes([k]) for k in order])
+    channel = recording.load(0)
     assert np.all(np.diff(channel.time) > 0.0)
-    assert channel.notes == ("2 frames with an earlier stamp left out",)
+    if step == 0.01:
+        assert channel.values.tolist() == list(range(20))
+        assert "2 frames out of order by up to 20 ms sorted by their stamps" in recording.warnings
+    else:
+        assert channel.values.tolist() == [*range(10), *range(11, 20)]
+        assert channel.notes == ("1 frames with an earlier stamp left out",)
 
 
 def test_repeated_stamps_are_left_out_and_counted_for_each_signal() -> None:

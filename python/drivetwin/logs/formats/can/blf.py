@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.frames import LONGEST, FrameRow, Frames, collect_frames
+from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.formats.frames import LONGEST, Frames, build_frames, describe_left_out
 
 _RANGE = 2.0**64 * 1e-9
 """Time [s] after which 64 bits of nanoseconds start again."""
@@ -28,35 +28,33 @@ def read_blf(path: Path) -> Frames:
 
 def _read_frames(reader: Any, kind: str, path: Path) -> Frames:
     """The table of data frames; what breaks off is read up to there."""
-    frames: list[FrameRow] = []
-    left_out = 0
-    warnings: list[str] = []
+    messages: list[Any] = []
+    broken: tuple[str, ...] = ()
     try:
         with handle_parser_errors(kind, path):
-            left_out = _collect_frames(reader, frames)
+            messages.extend(reader)
     except FileFormatError as fault:
-        if not frames:
+        if not messages:
             raise
-        warnings.append(f"{fault.what}; {len(frames)} frames were read before")
-    stamps = _count_from_start([row[0] for row in frames], reader.start_timestamp).tolist()
-    rows = [(stamp, *row[1:]) for stamp, row in zip(stamps, frames, strict=True)]
-    total = len(rows) + left_out
-    return collect_frames(rows, str(path), lines=total, other=left_out, notes=tuple(warnings))
+        broken = (f"{fault.what}; {len(messages)} frames were read before",)
+    frames = [one for one in messages if _is_data(one)]
+    if not frames:
+        what = "no frame can be read"
+        raise FileFormatError(what, "record it again", Where(file=str(path)))
+    stamps = [one.timestamp for one in frames]
+    return build_frames(
+        _count_from_start(stamps, reader.start_timestamp).tolist(),
+        [one.arbitration_id for one in frames],
+        [one.is_extended_id for one in frames],
+        [bytes(one.data) for one in frames],
+        [f"channel {one.channel}" for one in frames],
+        (*describe_left_out(len(messages), len(messages) - len(frames), len(frames)), *broken),
+    )
 
 
-def _collect_frames(reader: Iterable[Any], frames: list[FrameRow]) -> int:
-    """Append the data frames; return how many others there were."""
-    left_out = 0
-    for message in reader:
-        data = bytes(message.data)
-        if message.is_remote_frame or message.is_error_frame or len(data) > LONGEST:
-            left_out += 1
-            continue
-        frames.append(
-            (message.timestamp, message.arbitration_id, message.is_extended_id, data,
-             f"channel {message.channel}")
-        )  # fmt: skip
-    return left_out
+def _is_data(message: Any) -> bool:
+    is_other = message.is_remote_frame or message.is_error_frame
+    return not is_other and len(message.data) <= LONGEST
 
 
 def _count_from_start(stamps: Sequence[float], start: float) -> FloatArray:

@@ -23,7 +23,7 @@ from drivetwin.logs.formats.can.database import (
     select_valid_payloads,
 )
 from drivetwin.logs.formats.code_texts import describe_faults
-from drivetwin.logs.formats.frames import Frames, Message, Signal
+from drivetwin.logs.formats.frames import FEW_EARLIER, MOST_EARLIER, Frames, Message, Signal
 from drivetwin.logs.formats.j1939 import torque
 from drivetwin.logs.formats.j1939.codes import check_codes
 from drivetwin.logs.formats.j1939.matching import GroupTable, get_group
@@ -256,7 +256,7 @@ def _select_ordered(
     """Select, of the frames that are `there` (n,), those in order of time; return also the notes.
 
     Frames are left out that do not come after all before, or of J1939 repeat the one before at
-    once. Raises DamagedChannelError where more than `_MOST_EARLIER` of the stamps run back, as
+    once. Raises DamagedChannelError where more than `MOST_EARLIER` of the stamps run back, as
     after a clock that was set: it is not known which part is right.
     """
     rows = np.flatnonzero(there)
@@ -267,7 +267,7 @@ def _select_ordered(
         same = np.all(data[1:] == data[:-1], axis=1)
         again |= ~earlier & (np.diff(time) < REPEATED) & same
     counts = int(earlier.sum()), int(again.sum())
-    if counts[0] > max(_FEW_EARLIER, _MOST_EARLIER * rows.size):
+    if counts[0] > max(FEW_EARLIER, MOST_EARLIER * rows.size):
         at = float(time[1:][earlier][0])
         raise DamagedChannelError(
             f"{counts[0]} of {rows.size} frames have an earlier stamp than one before them",
@@ -279,13 +279,6 @@ def _select_ordered(
     texts = ("frames with an earlier stamp", "repeated frames")
     pairs = zip(counts, texts, strict=True)
     return kept, [f"{count} {text} left out" for count, text in pairs if count]
-
-
-_MOST_EARLIER = 0.01
-"""Share of a signal's frames that may have an earlier stamp than one before: threads of a logger
-that overtake each other."""
-_FEW_EARLIER = 3
-"""Such frames that a short log may have [count]."""
 
 
 def _describe_sender(track: Track) -> tuple[int | None, int]:

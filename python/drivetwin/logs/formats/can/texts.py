@@ -7,35 +7,27 @@ Native logs of bus tools for which there is no reader are refused by name, with 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.can.asc import is_asc, read_asc
-from drivetwin.logs.formats.can.candump import is_candump, read_candump
-from drivetwin.logs.formats.can.gvret import is_gvret, read_gvret
-from drivetwin.logs.formats.can.trc import is_trc, read_trc
+from drivetwin.logs.formats.can.line_format import read_lines
+from drivetwin.logs.formats.can.line_formats import BOM, find_line_format
 from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.raw import HEAD_BYTES
-
-_TEXT_FORMATS: tuple[tuple[Callable[[bytes], bool], Callable[[bytes, str], Frames]], ...] = (
-    (is_trc, read_trc),
-    (is_gvret, read_gvret),
-    (is_candump, read_candump),
-    (is_asc, read_asc),
-)
-"""Test of the first bytes, and reader, of each bus log in text format."""
 
 
 def is_bus_text(head: bytes) -> bool:
     """Return True if the first bytes of a file are a bus log in text format."""
-    return any(fits(head) for fits, _ in _TEXT_FORMATS)
+    return find_line_format(head.removeprefix(BOM)) is not None
 
 
 def read_bus_text(data: bytes, file: str) -> Frames:
     """Read the frames of a bus log in text format. Raises FileFormatError."""
-    return next(read for fits, read in _TEXT_FORMATS if fits(data[:HEAD_BYTES]))(data, file)
+    data = data.removeprefix(BOM)
+    choose = find_line_format(data[:HEAD_BYTES])
+    assert choose is not None
+    return read_lines(choose(data, file), data, file)
 
 
 _TO_ASC = "export it as ASC, BLF, MDF 4, a PEAK trace or 'candump -L' text"

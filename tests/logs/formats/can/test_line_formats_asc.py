@@ -11,20 +11,20 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.can.asc import is_asc, read_asc
+from drivetwin.logs.formats.can.texts import is_bus_text, read_bus_text
 from drivetwin.logs.formats.frames import Frames
 
 HEAD = "date Sat Nov 21 10:00:00.000 2026\nbase {} timestamps absolute\nno internal events logged\n"
 
 
 def read(body: str, base: str = "hex") -> Frames:
-    return read_asc((HEAD.format(base) + body).encode(), "bus.asc")
+    return read_bus_text((HEAD.format(base) + body).encode(), "bus.asc")
 
 
 def test_what_is_asc() -> None:
-    assert is_asc(b"date Fri May 3 12:00:00.000 am 2024\nbase hex  timestamps absolute\n")
-    assert is_asc(b"   0.010000 1  123  Rx   d 2 01 02\n")
-    assert not is_asc(b"time,n\n0.01,1\n")
+    assert is_bus_text(b"date Fri May 3 12:00:00.000 am 2024\nbase hex  timestamps absolute\n")
+    assert is_bus_text(b"   0.010000 1  123  Rx   d 2 01 02\n")
+    assert not is_bus_text(b"time,n\n0.01,1\n")
 
 
 _FRAME = st.builds(
@@ -49,7 +49,7 @@ def test_frames_are_those_that_another_program_wrote(
     with can.ASCWriter(str(path)) as writer:
         for message in sent:
             writer.on_message_received(message)
-    found = read_asc(path.read_bytes(), "bus.asc")
+    found = read_bus_text(path.read_bytes(), "bus.asc")
     # The writer counts from its first frame on.
     start = sent[0].timestamp if sent else 0.0
     assert found.time == pytest.approx([one.timestamp - start for one in sent], abs=2e-6)
@@ -147,11 +147,11 @@ def test_stamps_from_event_to_event_are_added_up() -> None:
         "   0.100000 1  123  Rx   d 2 01 02\n"
     )
     text = HEAD.format("hex").replace("absolute", "relative")
-    found = read_asc((text + body).encode(), "bus.asc")
+    found = read_bus_text((text + body).encode(), "bus.asc")
     assert found.time.tolist() == [0.01, 0.016, 0.1165]
     assert "time stamps from event to event added up" in found.warnings
     damaged = body.replace("0.001000", "0.001x00")
-    found = read_asc((text + damaged).encode(), "bus.asc")
+    found = read_bus_text((text + damaged).encode(), "bus.asc")
     assert "time stamps from event to event added up; after a damaged line they are early" in (
         found.warnings
     )

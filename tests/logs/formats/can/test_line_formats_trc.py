@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.can.trc import is_trc, read_trc
+from drivetwin.logs.formats.can.texts import is_bus_text, read_bus_text
 from drivetwin.logs.formats.frames import Frames
 
 VERSION_1_0 = """\
@@ -75,8 +75,8 @@ VERSION_2_1 = """\
 
 
 def read(text: str) -> Frames:
-    assert is_trc(text.encode())
-    return read_trc(text.encode(), "bus.trc")
+    assert is_bus_text(text.encode())
+    return read_bus_text(text.encode(), "bus.trc")
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_frames_are_those_that_another_program_wrote(
         writer.file_version = version
         for message in sent:
             writer.on_message_received(message)
-    found = read_trc(path.read_bytes(), "bus.trc")
+    found = read_bus_text(path.read_bytes(), "bus.trc")
     start = sent[0].timestamp
     exact = 2e-6 if version is TRCFileVersion.V2_1 else 1.1e-3
     assert found.time == pytest.approx([one.timestamp - start for one in sent], abs=exact)
@@ -181,5 +181,5 @@ def test_no_frame_is_told() -> None:
 
 
 def test_what_is_no_trace() -> None:
-    assert not is_trc(b"; comment\ntime;n\n0.01;1\n")
-    assert not is_trc(b"time,n\n0.01,1\n")
+    assert not is_bus_text(b"; comment\ntime;n\n0.01;1\n")
+    assert not is_bus_text(b"time,n\n0.01,1\n")

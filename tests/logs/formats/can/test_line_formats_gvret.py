@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import DrivetwinError, FileFormatError
-from drivetwin.logs.formats.can.gvret import is_gvret, read_gvret
+from drivetwin.logs.formats.can.texts import is_bus_text, read_bus_text
 from tests.fuzz.seeds import gvret
 
 HEAD = b"Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
@@ -26,13 +26,14 @@ FRAME = st.tuples(
 def test_written_frames_read_back_equal(
     frames: list[tuple[int, int, bool, int, bytes]], new: bool
 ) -> None:
+    frames.sort(key=lambda one: one[0])
     lines = []
     for time, identifier, extended, bus, payload in frames:
         way = "Rx," if new else ""
         cells = "".join(f"{byte:02X}," for byte in payload)
         flag = str(extended).lower()
         lines.append(f"{time},{identifier:08X},{flag},{way}{bus},{len(payload)},{cells}")
-    found = read_gvret((HEAD if new else OLD) + "\n".join(lines).encode(), "x")
+    found = read_bus_text((HEAD if new else OLD) + "\n".join(lines).encode(), "x")
     start = frames[0][0] if frames[0][0] > 1e12 else 0
     assert found.identifier.tolist() == [one[1] for one in frames]
     assert found.extended.tolist() == [one[2] for one in frames]
@@ -48,21 +49,21 @@ def test_written_frames_read_back_equal(
 
 def test_damaged_lines_are_counted() -> None:
     data = HEAD + b"1,123,false,Rx,0,1,00,\n2,123,false,Rx,0,3,00,\n3,80000000,true,Rx,0,0,\nx\n"
-    found = read_gvret(data, "x")
+    found = read_bus_text(data, "x")
     assert found.length.tolist() == [1]
     assert found.warnings == ("3 damaged lines left out of 4",)
 
 
 def test_a_head_alone_is_refused() -> None:
-    assert is_gvret(HEAD)
+    assert is_bus_text(HEAD)
     with pytest.raises(FileFormatError, match="no frame"):
-        read_gvret(HEAD, "x")
+        read_bus_text(HEAD, "x")
 
 
 @given(st.integers(0, 2000), st.binary(max_size=4))
 def test_damage_gives_a_typed_error_at_worst(place: int, other: bytes) -> None:
     data = gvret()
     damaged = data[:place] + other + data[place + 3 :]
-    if is_gvret(damaged):
+    if is_bus_text(damaged):
         with contextlib.suppress(DrivetwinError):
-            read_gvret(damaged, "x")
+            read_bus_text(damaged, "x")

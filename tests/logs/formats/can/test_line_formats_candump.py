@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.can.candump import is_candump, read_candump
+from drivetwin.logs.formats.can.texts import is_bus_text, read_bus_text
 
 SPACED = b""" (000.000000)  can0  18FCF200   [8]  E1 FF FF FF FF FF FF FF
  (000.005001)  can0  18FEDF00   [3]  8A A0 28
@@ -21,8 +21,8 @@ PACKED = b"""(1436509052.249713) vcan0 044#2A366C2BBA
 
 
 def test_the_form_for_people() -> None:
-    assert is_candump(SPACED)
-    frames = read_candump(SPACED, "log")
+    assert is_bus_text(SPACED)
+    frames = read_bus_text(SPACED, "log")
     assert frames.time.tolist() == [0.0, 0.005001, 0.006]
     assert frames.identifier.tolist() == [0x18FCF200, 0x18FEDF00, 0x123]
     assert frames.extended.tolist() == [True, True, False]
@@ -33,8 +33,8 @@ def test_the_form_for_people() -> None:
 
 
 def test_the_packed_form_is_relative_to_its_first_frame() -> None:
-    assert is_candump(PACKED)
-    frames = read_candump(PACKED, "log")
+    assert is_bus_text(PACKED)
+    frames = read_bus_text(PACKED, "log")
     assert frames.time == pytest.approx([0.0, 0.200134], abs=1e-6)
     assert frames.identifier.tolist() == [0x44, 0xABC]
     assert frames.extended.tolist() == [False, True]
@@ -47,12 +47,37 @@ def test_lines_that_are_no_data_frame_are_counted() -> None:
         b"(0.008000) can0 123#R\n"
         b" (000.010000)  can0  18FEDF00   [8]  8A A0\n garbage\n"
     )
-    frames = read_candump(data, "log")
+    frames = read_bus_text(data, "log")
     assert frames.time.size == 3
     assert frames.warnings == (
         "2 remote or error frames left out",
         "2 damaged lines left out of 7",
     )
+
+
+def test_frames_marked_as_errors_are_no_damage() -> None:
+    """The forms of `candump -ta -a -e -x` and of `candump -L`."""
+    data = SPACED + (
+        b" (000.007000)  can0  RX - -  1A0   [2]  01 02   '..'\n"
+        b" (000.008000)  can0  RX - -  20000004   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n"
+        b"\tcontroller-problem{}\n"
+        b" (000.009000)  can0  1A0   [0]  remote request\n"
+        b"(0.010000) can0 20000080#0000000000000000\n"
+    )
+    frames = read_bus_text(data, "log")
+    assert frames.identifier[3:].tolist() == [0x1A0]
+    assert frames.warnings == ("3 remote or error frames left out",)
+
+
+def test_frames_that_another_queue_overtook_are_sorted() -> None:
+    """Every fifth frame is stamped 2 ms early: too many steps back for a clock that is set."""
+    stamps = np.round(1.7e9 + 1e-3 * np.arange(500) - 2e-3 * (np.arange(500) % 5 == 4), 6)
+    data = "".join(f"({one:.6f}) can0 100#{k % 256:02X}\n" for k, one in enumerate(stamps))
+    frames = read_bus_text(data.encode(), "log")
+    assert frames.time.size == 500
+    assert np.all(np.diff(frames.time) >= 0.0)
+    assert frames.data[:, 0].tolist() == (np.argsort(stamps, kind="stable") % 256).tolist()
+    assert "100 frames out of order by up to 1 ms sorted by their stamps" in frames.warnings
 
 
 def test_frames_of_can_fd_are_longer() -> None:
@@ -62,8 +87,8 @@ def test_frames_of_can_fd_are_longer() -> None:
         b" (000.002000)  can0  124  [24]  " + long.hex(" ").encode() + b"\n"
         b"(0.003000) can0 125#0102\n"
     )
-    assert is_candump(data)
-    frames = read_candump(data, "log")
+    assert is_bus_text(data)
+    frames = read_bus_text(data, "log")
     assert frames.warnings == ()
     assert frames.length.tolist() == [24, 24, 2]
     assert frames.data[0].tobytes() == frames.data[1].tobytes() == long
@@ -72,12 +97,12 @@ def test_frames_of_can_fd_are_longer() -> None:
 
 @pytest.mark.parametrize("head", [b"", b"time,n\ns,rpm\n0,1\n", b"(hello) can0\n"])
 def test_other_texts_are_no_candump(head: bytes) -> None:
-    assert not is_candump(head)
+    assert not is_bus_text(head)
 
 
 def test_no_frame_at_all() -> None:
     with pytest.raises(FileFormatError, match="no frame can be read"):
-        read_candump(b"nothing\n", "log")
+        read_bus_text(b"(0.008000) can0 123#R\n", "log")
 
 
 def test_dates_are_stamps() -> None:
@@ -85,7 +110,7 @@ def test_dates_are_stamps() -> None:
         f" (2026-11-21 {clock})  can0  123   [1]  0{k}"
         for k, clock in enumerate(("23:59:59.900000", "23:59:60.100000", "99:59:59.000000"))
     ]
-    frames = read_candump(("\n".join(lines) + "\n").encode(), "log")
+    frames = read_bus_text(("\n".join(lines) + "\n").encode(), "log")
     assert frames.time == pytest.approx([0.0, 0.2], abs=1e-6)
     shift = "time counts from the first stamp, 1795305599.9 s"
     assert frames.warnings == ("1 damaged lines left out of 3", shift)
@@ -101,9 +126,9 @@ def test_dates_are_stamps() -> None:
 def test_stamps_of_no_clock_are_refused(form: str, reason: str) -> None:
     steps = np.random.default_rng(3).uniform(1e-4, 2e-3, 300)
     data = "".join(form.format(step) for step in steps).encode()
-    assert is_candump(data)
+    assert is_bus_text(data)
     with pytest.raises(FileFormatError, match=reason) as caught:
-        read_candump(data, "log")
+        read_bus_text(data, "log")
     assert "candump -L" in caught.value.remedy
 
 
@@ -122,6 +147,7 @@ FRAMES = st.lists(
 
 @given(FRAMES, st.booleans())
 def test_round_trip(sent: list[tuple[int, bool, int, bytes, str]], packed: bool) -> None:
+    sent.sort(key=lambda one: one[0])
     lines = []
     for micro, extended, number, data, bus in sent:
         name = f"{number:08X}" if extended else f"{number & 0x7FF:03X}"
@@ -130,7 +156,7 @@ def test_round_trip(sent: list[tuple[int, bool, int, bytes, str]], packed: bool)
             lines.append(f"{stamp} {bus} {name}#{data.hex()}")
         else:
             lines.append(f" {stamp}  {bus}  {name:>8}   [{len(data)}]  {data.hex(' ')}")
-    frames = read_candump(("\n".join(lines) + "\n").encode(), "log")
+    frames = read_bus_text(("\n".join(lines) + "\n").encode(), "log")
     assert frames.warnings == ()
     for row, (micro, extended, number, data, bus) in enumerate(sent):
         assert frames.time[row] == pytest.approx(micro / 1e6, abs=1e-9)
