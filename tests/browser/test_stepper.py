@@ -114,9 +114,6 @@ def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
     page.select_option("#methods", "all")
     page.click("#identify")
     _wait_for_states(page, *["done"] * 5, "next", "open")
-    show_view(page, "gearbox")
-    page.click("#show-gearbox")
-    page.wait_for_selector("#reduction table")
     show_view(page, "model")
     page.wait_for_selector("#model-plot .js-plotly-plot")
     findings = {}

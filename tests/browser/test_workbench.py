@@ -17,6 +17,7 @@ from playwright.sync_api import Browser, BrowserContext, Error, Page, Route, exp
 
 from tests.browser.bench import (
     PATIENCE,
+    VIEWS,
     Bench,
     correct_unit,
     drag_inertia_start,
@@ -113,6 +114,36 @@ def _report_picture(browser: Browser, report: Path, pictures: Path) -> None:
     context.close()
 
 
+_RECORD_MESSAGES = """
+window.messages = [];
+new MutationObserver(() => {
+  const shown = document.getElementById("message");
+  if (shown?.textContent) window.messages.push(shown.textContent);
+}).observe(document, { childList: true, characterData: true, subtree: true });
+"""
+
+
+@pytest.mark.parametrize("held", ["", "of-a-run-that-ended"])
+def test_the_first_opening_shows_no_message(browser: Browser, tmp_path: Path, held: str) -> None:
+    """Neither in a browser that has never opened the page, nor in a tab of an earlier run."""
+    context = browser.new_context()
+    page = context.new_page()
+    page.add_init_script(_RECORD_MESSAGES)
+    if held:
+        page.add_init_script(f"sessionStorage.session ??= '{json.dumps(held)}'")
+    with serve_folder(tmp_path) as address:
+        page.goto(address)
+        expect(page.locator("#status")).to_contain_text("no log is open")
+        for _ in range(2):
+            for name in VIEWS:
+                show_view(page, name)
+            page.wait_for_load_state("networkidle")
+            assert page.evaluate("window.messages") == []
+            page.reload()
+            expect(page.locator("#status")).to_contain_text("no log is open")
+    context.close()
+
+
 _BUSY_CLICKS = """ids => ids.forEach((id) => {
   const begin = Date.now();
   while (Date.now() < begin + 5);
@@ -137,7 +168,7 @@ def test_the_way_back_and_loading_again_keep_to_the_views(shown: Page) -> None:
 
 
 def test_of_clicks_in_a_row_the_last_one_counts(shown: Page) -> None:
-    for names in (("channels", "model"), ("export", "log"), ("model", "channels", "gearbox")):
+    for names in (("channels", "model"), ("export", "log"), ("model", "channels", "workspace")):
         shown.evaluate(_BUSY_CLICKS, [f"nav-{name}" for name in names])
         expect(shown.locator(f"#view-{names[-1]}")).to_be_visible()
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from flask.testing import FlaskClient
 
-from drivetwin.workbench.access_control import KEY_HEADER, Access, is_loopback, is_own_host
+from drivetwin.workbench.access_control import KEY_HEADER, Access, is_own_host
 from drivetwin.workbench.server import build_server
 from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace_folder import Folder
@@ -35,8 +35,8 @@ ROUTES = (
 @pytest.mark.parametrize(
     "named", ["127.0.0.1:8050", "localhost:8050", "127.0.0.1", "[::1]:8050", "127.1.2.3:1"]
 )
-def test_own_names_on_loopback(named: str) -> None:
-    assert is_own_host(named, "127.0.0.1")
+def test_own_names(named: str) -> None:
+    assert is_own_host(named)
 
 
 @pytest.mark.parametrize(
@@ -45,24 +45,8 @@ def test_own_names_on_loopback(named: str) -> None:
      "127.0.0.1.nip.io", "0.0.0.0:8050", "127.0.0.1:x", "127.0.0.1:99999",
      "[", "[::1", "127.0.0.1@evil.example", "user@evil:1"],
 )  # fmt: skip
-def test_foreign_names_on_loopback(named: str) -> None:
-    assert not is_own_host(named, "127.0.0.1")
-
-
-def test_on_the_network_addresses_and_the_stated_name_count() -> None:
-    assert is_own_host("192.168.1.5:8050", "0.0.0.0")
-    assert is_own_host("bench7:8050", "bench7")
-    assert not is_own_host("evil.example", "0.0.0.0")
-    assert not is_own_host("evil.example", "bench7")
-
-
-@pytest.mark.parametrize(
-    ("host", "own"),
-    [("127.0.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False), ("::", False),
-     ("192.168.1.5", False), ("bench7", False)],
-)  # fmt: skip
-def test_what_only_this_machine_reaches(host: str, own: bool) -> None:
-    assert is_loopback(host) is own
+def test_foreign_names(named: str) -> None:
+    assert not is_own_host(named)
 
 
 @pytest.fixture
@@ -107,17 +91,13 @@ def test_the_link_opens_the_page(client: FlaskClient, headers: dict[str, str]) -
             assert page.status_code == 200
 
 
-def test_neither_cookie_nor_key_is_the_token_and_each_browser_has_its_own(
-    client: FlaskClient,
-) -> None:
-    secrets: list[str] = []
-    for _ in range(2):
-        answer = client.get("/?token=right", base_url=HERE)
-        assert "right" not in str(answer.headers) + answer.text
-        secrets += re.findall(r"#key=([\w-]+)\"><", answer.text)
-        secrets += re.findall(r"drivetwin-8050=([\w-]+)", answer.headers["Set-Cookie"])
-    assert len(set(secrets)) == 4
-    assert min(map(len, secrets)) >= 43
+def test_cookie_and_key_are_not_the_token(client: FlaskClient) -> None:
+    answer = client.get("/?token=right", base_url=HERE)
+    assert "right" not in str(answer.headers) + answer.text
+    found = re.findall(r"#key=([\w-]+)\"><", answer.text)
+    found += re.findall(r"drivetwin-8050=([\w-]+)", answer.headers["Set-Cookie"])
+    assert len(set(found)) == 2
+    assert min(map(len, found)) >= 43
 
 
 def test_the_cookie_alone_reads_no_data(client: FlaskClient) -> None:
@@ -178,9 +158,3 @@ def test_the_token_is_new_each_time_and_in_no_log() -> None:
     assert len(one.token) >= 43
     assert one.token not in repr(one)
     assert one.make_link(8050) == f"{HERE}/?token={one.token}"
-    assert Access("::1", "t").make_link(1) == "http://[::1]:1/?token=t"
-
-
-def test_who_may_connect_is_described() -> None:
-    assert "this machine only" in Access().describe()
-    assert "every machine that reaches 0.0.0.0" in Access("0.0.0.0").describe()

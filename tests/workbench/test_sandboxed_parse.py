@@ -15,7 +15,6 @@ from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.sandboxed_parse import (
     Opened,
     Request,
-    open_gearbox,
     open_log,
 )
 from tests.workbench.bad_files import hdf5_bomb, mat_bomb
@@ -78,15 +77,6 @@ def test_a_file_that_expands_beyond_memory_is_refused(
     with pytest.raises(InputError) as caught:
         call(open_log, request, tmp_path / "mapping.toml", limit=BASE_TIME)
     assert str(caught.value)
-
-
-def test_a_gearbox_card_is_named_by_its_label(tmp_path: Path) -> None:
-    path = tmp_path / "a1b2c3"
-    path.write_text("name = 3\n")
-    with pytest.raises(InputError) as caught:
-        call(open_gearbox, path, "box.toml", limit=BASE_TIME)
-    assert "box.toml" in str(caught.value)
-    assert "a1b2c3" not in str(caught.value)
 
 
 def test_faults_of_an_upload_call_it_by_its_label(place: Path, tmp_path: Path) -> None:

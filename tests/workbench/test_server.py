@@ -143,6 +143,13 @@ def test_files_of_the_program_are_not_served(bench: Bench, path: str) -> None:
     assert b"SPDX" not in answer.data
 
 
+@pytest.mark.parametrize("path", ["dash/nothing.js", "nothing/x.js", "dash/../server.py"])
+def test_a_library_path_that_does_not_exist_is_not_found(bench: Bench, path: str) -> None:
+    address = f"/_dash-component-suites/{path}"
+    answer = bench.client.get(address, base_url="http://127.0.0.1:8050")
+    assert answer.status_code == 404
+
+
 def test_uploads_of_one_session_are_unknown_to_another(bench: Bench) -> None:
     key = bench.upload("log.csv", TABLE).json["key"]
     other = bench.sessions.get(bench.sessions.create())

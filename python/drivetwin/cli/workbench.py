@@ -10,7 +10,7 @@ import typer
 
 from drivetwin._util.interrupts import ignore_interrupts
 from drivetwin._util.request import Request, argument, input_file, option
-from drivetwin.cli.output import print_line, print_paragraph
+from drivetwin.cli.output import print_line
 from drivetwin.errors import MissingExtraError
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from drivetwin.workbench.views.page import Start
     from drivetwin.workbench.workspace_folder import Folder
 
-LOOPBACK = "127.0.0.1"
 _LINK_PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>drivetwin</title>
 <meta http-equiv="refresh" content="0; url={0}"></head><body><a href="{0}">{0}</a></body></html>
 """
@@ -35,7 +34,6 @@ class OpenWorkbench(Request, command="app"):
     folder: Path = option(
         "Folder for all files that are opened or saved.", metavar="DIR", default=Path()
     )
-    host: str = option("Address to listen on; default: this machine only.", default=LOOPBACK)
     port: int = option("Port; 0: any free port.", default=8050)
     browser: bool = option("Open the page in a browser.", "--browser/--no-browser", default=True)
 
@@ -43,8 +41,7 @@ class OpenWorkbench(Request, command="app"):
 def workbench(request: OpenWorkbench) -> None:
     """Open the workbench in the browser: from a log to a validated model.
 
-    No network is needed. Access requires the printed link. Other machines can connect only with
-    --host.
+    No network is needed. Access requires the printed link. Other machines cannot connect.
     """
     _require_dash()
     from drivetwin.workbench.access_control import Access
@@ -53,11 +50,11 @@ def workbench(request: OpenWorkbench) -> None:
     from drivetwin.workbench.server import build_server, start_server
     from drivetwin.workbench.workspace_folder import Folder
 
-    place, access = Folder.from_path(request.folder), Access(request.host)
+    place, access = Folder.from_path(request.folder), Access()
     remove_dead_folders()
     app, sessions = build_server(place, _make_start(place, request), access)
     try:
-        server = start_server(app, request.host, request.port)
+        server = start_server(app, request.port)
         _serve(server, access, place, sessions.place.path, browser=request.browser)
     except KeyboardInterrupt:
         pass  # the way to end the program
@@ -71,16 +68,9 @@ def _serve(
     server: BaseWSGIServer, access: Access, place: Folder, private: Path, *, browser: bool
 ) -> None:
     """Print the link and answer requests until the program is ended."""
-    from drivetwin.workbench.access_control import is_loopback
-
     link = access.make_link(server.port)
     print_line(f"workbench at {link} , files of {place.root}; Ctrl-C ends it")
-    print_line(access.describe())
-    if not is_loopback(access.host):
-        print_paragraph(
-            "warning: the connection is not encrypted. Whoever reads the network traffic gets the "
-            "link, and can read and write files of this folder"
-        )
+    print_line("access: this machine only, with the link")
     with server:
         if browser:
             _launch_browser(link, private)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A gearbox in blocks: its application table and members, one gear in full, a reduced shift."""
+"""Blocks of a gearbox: application table, one gear in full, a reduced shift."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivetwin._util.display_units import NM, RPM, format_significant
@@ -75,35 +75,6 @@ def build_gear_blocks(gear: GearStatics) -> list[Block]:
         ),
         TextBlock(f"Powers sum to zero within {gear.power_error:.1e} of the input power."),
     ]
-
-
-def build_member_tables(box: Gearbox) -> Iterator[TableBlock]:
-    """Yield the tables of the planetary sets, if any, and of the members with what joins them."""
-    if box.sets:
-        sets = [(one.name, one.sun, one.ring, one.carrier, one.z) for one in box.sets]
-        columns = ("set", "sun", "ring", "carrier", ("z", ".4g"))
-        yield make_table("Planetary sets.", columns, sets)
-    members = [
-        (name, box.inertias.get(name) or None, ", ".join(parts))
-        for name, parts in list_joints(box).items()
-    ]
-    yield make_table("Members.", ("member", ("inertia [kg·m²]", ".4g"), "joined by"), members)
-
-
-def list_joints(box: Gearbox) -> dict[str, list[str]]:
-    """List the sets, pairs and elements that join each member, input first and output last."""
-    joined: dict[str, list[str]] = {}
-    for one in box.sets:
-        for part, member in (("sun", one.sun), ("ring", one.ring), ("carrier", one.carrier)):
-            joined.setdefault(member, []).append(f"{part} of {one.name}")
-    for pair in box.pairs:
-        for member in (pair.a, pair.b):
-            joined.setdefault(member, []).append(f"pair {pair.name}")
-    for element in box.elements.values():
-        for member in (element.a, element.b):
-            joined.setdefault(member, []).append(element.name)
-    order = sorted(joined, key=lambda name: (name == box.output, name != box.input))
-    return {name: joined[name] for name in order}
 
 
 def build_reduction_blocks(found: ReducedShift) -> list[Block]:

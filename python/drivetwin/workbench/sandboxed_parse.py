@@ -29,7 +29,6 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import Proposal, propose_time_units
 from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
-from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.logs.open_mapped import open_stated
@@ -250,12 +249,6 @@ def _check_card(card: VehicleCard, log: ShiftLog, found: FoundShifts) -> tuple[F
         return (*check_card(card, log, found.shifts), *remarks)
     except DrivetwinError:
         return (*check_card(card), *remarks)
-
-
-def open_gearbox(emit: Emit, path: Path, label: str) -> None:
-    """Read a gearbox card, called `label` in messages; emits it. Raises CardError."""
-    with _apply_labels({path: label}):
-        emit(load_gearbox(str(path)))
 
 
 @contextmanager

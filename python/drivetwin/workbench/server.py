@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The server of the workbench: pages, uploads, and its life from start to end."""
+"""The application of the workbench, and the server that its uploads and pages go through."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import sys
 from pathlib import Path
 
 from dash import Dash
+from dash.exceptions import DependencyException
 from flask import Response, request
-from werkzeug.serving import BaseWSGIServer, make_server
 
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.workbench import jobs
-from drivetwin.workbench.access_control import Access, make_refusal, protect
+from drivetwin.workbench.access_control import ADDRESS, Access, make_refusal, protect
+from drivetwin.workbench.connections import BoundedServer
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_callback_requests, escape_callback_responses
@@ -37,31 +38,34 @@ def build_server(folder: Folder, start: Start, access: Access) -> tuple[Dash, Se
         suppress_callback_exceptions=True,
         add_log_handler=False,
     )
-    build_page(app, sessions, start, access)
+    build_page(app, sessions, start)
     _register_uploads(app, sessions)
     protect(app.server, access, list(app.csp_hashes()))
     check_callback_requests(app.server, app)
     escape_callback_responses(app.server)
+
+    @app.server.errorhandler(DependencyException)  # type: ignore[untyped-decorator]
+    def refuse_library(_: DependencyException) -> Response:
+        return make_refusal(404, "there is no such file of a library")
+
     return app, sessions
 
 
-def start_server(app: Dash, host: str, port: int) -> BaseWSGIServer:
-    """A server on `host` and `port` (0: any free one), not yet serving.
+def start_server(app: Dash, port: int) -> BoundedServer:
+    """A server on `port` (0: any free one) of this machine, not yet serving.
 
     Raises InputError where it cannot listen there.
     """
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        bound = socket.create_server((host, port), family=family)
+        bound = socket.create_server((ADDRESS, port))
     except (OSError, OverflowError) as fault:
         raise InputError(
-            f"cannot listen on {host}, port {port}: {fault}",
-            "choose another --port, or 0 for any free one",
+            f"cannot listen on port {port}: {fault}", "choose another --port, or 0 for any free one"
         ) from None
     jobs.warm_up()
     with bound:
-        return make_server(host, port, app.server, threaded=True, fd=bound.fileno())
+        return BoundedServer(ADDRESS, port, app.server, fd=bound.fileno())
 
 
 def _register_uploads(app: Dash, sessions: Sessions) -> None:

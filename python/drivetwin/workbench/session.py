@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import IO, Any
 
 from drivetwin._util.atomic import write_bytes, write_text
-from drivetwin._util.request import Request
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.channels.mapping_file import find_project_mapping
@@ -26,8 +25,7 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox
-from drivetwin.logs.formats.guarded import BASE_TIME, compute_parser_limits
+from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.report.figure import Figure
 from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
@@ -48,7 +46,7 @@ Above `MOST_LOGS`, as all logs and the card may be uploads.
 
 
 _STORED = "session.pickle"
-_KEPT = ("work", "gearbox", "uploads", "form", "view")
+_KEPT = ("work", "uploads", "form", "view")
 """Attributes of a session that are stored; all else is computed again."""
 
 
@@ -70,13 +68,10 @@ class Session:
     work: SessionState = field(default_factory=SessionState)
     job: jobs.Job | None = None
     live: Live | None = None
-    gearbox: Gearbox | None = None
     uploads: dict[str, uploads.Upload] = field(default_factory=dict)
     form: CardForm | None = None
     preview: tuple[ColumnKey, Preview] | None = None
     view: View | None = None
-    choices: dict[type[Request], Mapping[str, Any]] = field(default_factory=dict)
-    """Values chosen in the forms of requests, by argument."""
     used: float = field(default_factory=time.monotonic)
     users: int = 0
     """Number of requests that act on the session at present."""
@@ -343,18 +338,6 @@ class Session:
         """Record that the result was exported."""
         with self.lock:
             self.work = replace(self.work, has_exported=True)
-
-    def open_gearbox(self, card: Source | str) -> None:
-        """Load a gearbox card, or a built-in one by its name. Raises CardError."""
-        if isinstance(card, str):
-            if card not in list_builtin_gearboxes():
-                raise InputError("no gearbox is named", "choose a built-in one, or name a card")
-            self.gearbox = load_gearbox(card)
-        else:
-            limit = BASE_TIME
-            self.gearbox = jobs.call(
-                sandboxed_parse.open_gearbox, card.path, card.name, limit=limit
-            )
 
     def save(self, name: str) -> str:
         """Save the workspace in the folder; returns the name it has there."""

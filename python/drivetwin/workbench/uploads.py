@@ -21,7 +21,6 @@ from drivetwin.workbench import jobs
 LIMITS = {
     "log": 200 * 2**20,  # ten minutes of 40 channels at 1 kHz; larger ones are opened by path
     "card": 2 * 2**20,
-    "gearbox": 2 * 2**20,
     "workspace": 20 * 2**20,  # three twins take some 0.3 MB
 }
 """Bytes that an upload may have, by what it is for."""

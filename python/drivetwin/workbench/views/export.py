@@ -37,16 +37,6 @@ def build_choices(request: type[Request]) -> list[Component]:
     ]
 
 
-def register_choices(page: ui.Page, request: type[Request]) -> None:
-    """Register the callback that keeps the chosen values in the session."""
-    pattern = {"request": request.__name__, "id": ALL}
-
-    @page.callback(Input(pattern, "data-value"), State(pattern, "id"), initially=True)
-    def choose(session: Session, values: Sequence[str], ids: Sequence[ControlId]) -> None:
-        """Keep the chosen values."""
-        session.choices[request] = parse_choices(request, values, ids)
-
-
 def parse_choices(
     request: type[Request], values: Sequence[str], ids: Sequence[ControlId]
 ) -> dict[str, Any]:
@@ -98,16 +88,25 @@ def _build_group(entries: dict[str, tuple[str, str]]) -> Component:
 
 
 def register(page: ui.Page) -> None:
-    """Register the callbacks of the choices and of the buttons."""
+    """Register the callback of the buttons."""
+    pattern = {"request": ExportOptions.__name__, "id": ALL}
 
-    register_choices(page, ExportOptions)
-
-    @page.callback(Output("download", "data"), Input({"export": ALL, "at": ALL}, "n_clicks"))
-    def hand_over(session: Session, clicks: list[int | None]) -> Any:
+    @page.callback(
+        Output("download", "data"),
+        Input({"export": ALL, "at": ALL}, "n_clicks"),
+        State(pattern, "data-value"),
+        State(pattern, "id"),
+    )
+    def hand_over(
+        session: Session,
+        clicks: list[int | None],
+        values: tuple[str, ...],
+        ids: tuple[ControlId, ...],
+    ) -> Any:
         """Write the file and send it to the browser."""
         if not ctx.triggered_id or not any(clicks):
             return no_update
-        choices = session.choices.get(ExportOptions, {})
+        choices = parse_choices(ExportOptions, values, ids)
         wanted = _parse_choice(get_triggered_part("export"), choices)
         product = make_product(session.work, wanted, session.scratch)
         if wanted is not Record.MAPPING:

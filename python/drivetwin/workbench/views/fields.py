@@ -103,8 +103,8 @@ def escape_callback_responses(server: Flask) -> None:
 def check_fields(callback: Callable[..., Any], values: Sequence[object]) -> list[Any]:
     """Return the values of the parameters of `callback` but the session, as their types.
 
-    Raises RefusedError where a value has another type, and where lists of one table differ in
-    length.
+    Raises RefusedError where a value has another type, and where lists differ in length: they are
+    the columns of one table. Values of another group of controls are tuples.
     """
     names, model = _make_model(callback)
     document = {f"field{number}": value for number, value in enumerate(values)}

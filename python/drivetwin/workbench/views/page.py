@@ -10,7 +10,6 @@ from dash import Dash, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.report.html import read_template
-from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.sessions import Sessions
@@ -20,7 +19,6 @@ from drivetwin.workbench.views import (
     channels,
     compare,
     export,
-    gearbox,
     identify,
     log,
     model,
@@ -63,7 +61,6 @@ _STEPS = {
 }
 _MORE = {
     "compare": ("Compare", compare),
-    "gearbox": ("Gearbox", gearbox),
     "workspace": ("Workspace", workspace),
 }
 VIEWS = {**{step.value: (TITLES[step], view) for step, view in _STEPS.items()}, **_MORE}
@@ -76,7 +73,6 @@ _TOPICS = {
     "identify": (Topic.RESULTS, Topic.PHASES, Topic.LOCKS, Topic.HELD),
     "model": (Topic.RESULTS, Topic.LIVE),
     "compare": (Topic.RESULTS,),
-    "gearbox": (Topic.GEARBOX,),
     "workspace": (Topic.LOG,),
 }
 """Topics of a session that each view depends on."""
@@ -108,14 +104,14 @@ The view stands in the address, for the browser's way back and for loading the p
 """
 
 
-def build_page(app: Dash, sessions: Sessions, start: Start, access: Access) -> None:
+def build_page(app: Dash, sessions: Sessions, start: Start) -> None:
     """Give the application its layout and the callbacks of all views."""
     app.index_string = _INDEX.replace("STATUS", read_template("status.css"))
     app.layout = _build_layout
     _register_view_switch(app)
     _register_drawing(app)
     _register_entry(app, sessions, start)
-    _show_status(app, sessions, access)
+    _show_status(app, sessions)
     register_states(app, sessions)
     for _, view in VIEWS.values():
         view.register(Page(app, sessions))
@@ -175,7 +171,6 @@ def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
         """Go on with the session of this tab, or begin one with what the command line named."""
         if key in sessions:
             notify_topic(Topic.LOG)
-            notify_topic(Topic.GEARBOX)
             return no_update
         fresh = sessions.create()
         if start.log is not None:
@@ -190,7 +185,7 @@ def _open_first(session: Session, start: Start) -> None:
         session.open(start.log, start.card, start.mapping)
 
 
-def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
+def _show_status(app: Dash, sessions: Sessions) -> None:
     @app.callback(
         Output("status", "children"),
         Input(make_topic_id(Topic.LOG), "data"),
@@ -202,12 +197,12 @@ def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
     def status(
         _log: object, _results: object, _selection: object, key: object
     ) -> list[Component | str]:
-        """Format the status line: open files, available results, and who may connect."""
+        """Format the status line: open files and available results."""
         if key not in sessions:
             return []
         work = sessions.get(key).work
         if work.log is None or work.opened is None:
-            return [f"no log is open · {access.describe()}"]
+            return ["no log is open"]
         others = len(work.logs) - 1
         parts: list[Component | str] = [html.B(work.log.name)]
         if others:
@@ -219,4 +214,4 @@ def _show_status(app: Dash, sessions: Sessions, access: Access) -> None:
             parts.append(f" · identified: {', '.join(method.value for method in work.results)}")
         if work.bus is not None:
             parts.append(f" · identified: {len(work.bus.found.shifts)} shifts of bus logs")
-        return [*parts, f" · {access.describe()}"]
+        return parts

@@ -42,7 +42,6 @@ class Topic(StrEnum):
     PHASES = "phases"
     RESULTS = "results"
     LIVE = "live"
-    GEARBOX = "gearbox"
     FORM = "form"
     LOCKS = "locks"
     STEPS = "steps"
@@ -55,7 +54,6 @@ _CONCERNED = {
     Topic.PHASES: (Topic.PHASES, Topic.LIVE),
     Topic.RESULTS: (Topic.RESULTS, Topic.LIVE, Topic.STEPS),
     Topic.LIVE: (Topic.LIVE,),
-    Topic.GEARBOX: (Topic.GEARBOX,),
     Topic.FORM: (Topic.FORM,),
     Topic.LOCKS: (Topic.LOCKS,),
     Topic.STEPS: (Topic.STEPS,),
@@ -127,7 +125,7 @@ class Page:
     sessions: Sessions
 
     def callback(
-        self, *arguments: DashDependency, busy: str = "", initially: bool = False
+        self, *arguments: DashDependency, busy: str = ""
     ) -> Callable[[Callable[..., R]], Callable[..., R]]:
         """Register a function of the tab's session and of the values of `arguments`.
 
@@ -146,7 +144,7 @@ class Page:
                 *arguments,
                 State("session", "data"),
                 running=running,
-                prevent_initial_call=not initially,
+                prevent_initial_call=True,
             )(show_errors(act, None if silent else no_update))
             return callback
 
