@@ -13,7 +13,7 @@ from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages
 from drivetwin.channels.commands import refuse_commands
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import InputError, MappingError, Where
 from drivetwin.estimation.data.actuators import (
     FoundActuators,
     LogShifts,
@@ -26,6 +26,7 @@ from drivetwin.estimation.identify import identify as identify_prepared
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
+from drivetwin.shifts.causes import find_causes
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.vehicle.locks import apply_locks, collect_locks
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -118,7 +119,7 @@ def identify(
         )
     stages = _BY_METHOD[method]
     with stages.enter("preparation", "preparing the log"):
-        _refuse_commands(log, shifts)
+        _refuse_wrong_pressures(log, card, shifts)
         actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
         prepared = _prepare_checked(log, apply_locks(card, locks), shifts)
     with stages.enter("estimation"):
@@ -160,16 +161,20 @@ def identify_jointly(
     with _JOINT.enter("preparation", "preparing the logs"):
         pairs = list(zip(logs, shifts, strict=True))
         for log, found in pairs:
-            _refuse_commands(log, found)
+            _refuse_wrong_pressures(log, card, found)
         actuators = identify_actuators([LogShifts(log, one.shifts) for log, one in pairs], card)
         prepared = [_prepare_checked(log, card, one) for log, one in pairs]
     with _JOINT.enter("estimation"):
         return _attach_actuators(identify_joint(prepared), actuators)
 
 
-def _refuse_commands(log: ShiftLog, found: FoundShifts) -> None:
-    """Raise MissingChannelError if the pressures of the shifts are commands."""
+def _refuse_wrong_pressures(log: ShiftLog, card: VehicleCard, found: FoundShifts) -> None:
+    """Raise MissingChannelError if the pressures of the shifts are commands, MappingError if those
+    of two elements are exchanged."""
     refuse_commands(log, [name for one in found.shifts for name in (one.offgoing, one.oncoming)])
+    for one in find_causes(log, card):
+        if one.code is Code.PRESSURES_EXCHANGED:
+            raise MappingError(one.cause, one.remedy, Where(file=log.source))
 
 
 def _attach_actuators(found: Identification, actuators: FoundActuators) -> Identification:

@@ -63,7 +63,7 @@ def test_an_engine_faster_than_the_turbine_for_seconds_is_a_converter() -> None:
     assert "converter" in found.estimates["J_engine"].reason
     for name, right in zip("1234567", (5.0, 3.2, 2.143, 1.72, 1.313, 1.0, 0.823), strict=True):
         assert found.estimates[f"ratio_{name}"].value == pytest.approx(right, rel=0.01)
-    assert not select(found.findings, Code.BUS_RATIO_UNKNOWN)
+    assert not select(found.findings, Code.RATIO_UNKNOWN)
 
 
 def test_what_does_not_oscillate_is_no_decay() -> None:
@@ -78,8 +78,8 @@ def test_what_does_not_oscillate_is_no_decay() -> None:
 def test_ratios_that_rest_on_no_gear_of_the_card_are_named() -> None:
     path = shared("cases/public4/converter_automatic/zf8_wrong_generation.toml")
     _, findings = find_shifts(read("converter_automatic/g11_s.csv"), load_ratio_card(path))
-    (one,) = select(findings, Code.BUS_RATIO_UNKNOWN)
+    (one,) = select(findings, Code.RATIO_UNKNOWN)
     for ratio in ("3.205 for", "1.722 for", "1.314 for"):
         assert ratio in one.text
     assert "another gearbox" in one.remedy
-    assert select(identify_automatic("zf8_wrong_generation").findings, Code.BUS_RATIO_UNKNOWN)
+    assert select(identify_automatic("zf8_wrong_generation").findings, Code.RATIO_UNKNOWN)

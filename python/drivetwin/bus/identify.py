@@ -41,14 +41,15 @@ from drivetwin.bus.road_load import RoadLoad
 from drivetwin.bus.scatter import Combined, combine
 from drivetwin.bus.torque import TorqueBalance
 from drivetwin.bus.torque_estimates import estimate_torques, find_dead_time
-from drivetwin.bus.unknown_ratios import find_unknown_ratios, report_unknown_ratios
+from drivetwin.bus.unknown_ratios import find_unknown_ratios
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
 from drivetwin.estimation.linear.ringdown import RING_DOWN
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain, report
-from drivetwin.plausibility.ratios import HeldRatio, is_held
+from drivetwin.shifts.causes import report_unknown_ratios
+from drivetwin.shifts.held_ratios import HeldRatio, is_held
 from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.vehicle.spec import Z95
 
@@ -148,7 +149,7 @@ def find_shifts(log: ShiftLog, card: RatioCard) -> tuple[Timeline, tuple[Finding
     bus, remarks = set_converter_aside([prepare_bus_log(log, Path(log.source).name)], ratios)
     late, _ = _align(bus, ratios)
     line = find_timeline(bus[0], ratios, late)
-    unknown = report_unknown_ratios(find_unknown_ratios(bus, card), card)
+    unknown = report_unknown_ratios(find_unknown_ratios(bus, card), ratios)
     return line, (*remarks, *unknown, *find_limits(line))
 
 
@@ -252,7 +253,7 @@ class _ResultBuilder:
     """Estimates and findings, added stage by stage."""
 
     def __init__(
-        self, ratios: Mapping[str, float], card: RatioCard | None, unknown: Sequence[HeldRatio]
+        self, ratios: Mapping[str, float], card: RatioCard | None, unknown: list[HeldRatio]
     ) -> None:
         self.ratios = ratios
         self.card = card
@@ -260,7 +261,7 @@ class _ResultBuilder:
         self.estimates: dict[str, Estimate] = {}
         self.decays: dict[str, JointDecay] = {}
         self.refused: dict[str, str] = {}
-        self.findings = [] if card is None else report_unknown_ratios(unknown, card)
+        self.findings = report_unknown_ratios(unknown, ratios)
 
     def add_alignment(self, aligned: Mapping[str, Alignment]) -> None:
         """Add ratios and delays."""

@@ -58,7 +58,7 @@ def identify_logs(
                 reads.append(read_shifts(path, how, card))
     show_findings(dict.fromkeys(one for _, _, doubts in reads for one in doubts))
     for log, each, _ in reads:
-        refuse_without_shifts(log, each)
+        refuse_without_shifts(log, card, each)
     read, shifts = [log for log, _, _ in reads], [each for _, each, _ in reads]
     held = parse_holdouts(wanted, logs, shifts)
     sources = [

@@ -92,7 +92,7 @@ def run_identification(log: Path, how: IdentifyOptions) -> Outcome:
         card = how.load_card()
         recording, shifts, doubts = read_shifts(log, how, card)
     show_findings(doubts)
-    refuse_without_shifts(recording, shifts)
+    refuse_without_shifts(recording, card, shifts)
     with show_step(f"identifying by the {how.method} method"):
         model = identify_validated(recording, card, shifts, how.method)
     found = model.result

@@ -59,6 +59,7 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     """
     from drivetwin.files.records import dump_findings
     from drivetwin.report.sections.summary import build_phase_table
+    from drivetwin.shifts.causes import find_causes
     from drivetwin.shifts.detect import find_gear_spans
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
     from drivetwin.shifts.shift import make_shift_labels
@@ -77,10 +78,11 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     comparison = compare_drives(found.shifts, others)
     closings = detect_lock_ups(recording, card)
     seen = _estimate_from_speeds(recording, card, found.shifts)
+    findings = (*recording.findings, *find_causes(recording, card))
     if request.output is not None and found.shifts:
         _write_page(request.output, found.shifts, recording, comparison)
     if as_json:
-        remarks = {"findings": dump_findings(recording.findings)}
+        remarks = {"findings": dump_findings(findings)}
         compared = {"comparison": [asdict(one) for one in comparison]} if request.against else {}
         print_json(_to_document(found, closings, seen) | compared | remarks)
         return
@@ -92,7 +94,7 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     _print_details(found, closings, seen)
     if request.against:
         _print_comparison(comparison)
-    print_findings(recording.findings)
+    print_findings(findings)
     if request.output is not None and found.shifts:
         print_line(f"wrote {request.output}")
 

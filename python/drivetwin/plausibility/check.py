@@ -15,7 +15,9 @@ from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.plausibility.entries import check_entries, find_entry
 from drivetwin.plausibility.friction import check_friction, check_inertias, sample_span
-from drivetwin.plausibility.ratios import check_ratios, find_log_ratios, is_held
+from drivetwin.plausibility.ratios import check_ratios, find_log_ratios
+from drivetwin.shifts.causes import find_causes
+from drivetwin.shifts.held_ratios import is_held
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
@@ -114,7 +116,11 @@ def check_card(
         return tuple(found)
     if OUTPUT_INERTIA in {one.place.key for one in found}:
         card = replace(card, J_out=None)
-    found += check_ratios(log, card)
+    causes = find_causes(log, card)
+    differing = check_ratios(log, card)
+    found += differing
+    if any(one.code is Code.PRESSURES_EXCHANGED for one in causes):
+        return (*found, *causes)  # what the pressures say of the card follows from the exchange
     found += check_pressures(log, card, shifts, list_doubted_elements(card, found))
     sound = [one for one in shifts if not _has_doubted_gear(one, card, found)]
     known = "output_torque" in log or ENGINE_INERTIA not in {one.place.key for one in found}
@@ -122,7 +128,9 @@ def check_card(
         found += check_friction(log, card, sound, list_doubted_elements(card, found))
     keys = frozenset(one.place.key or "" for one in found)
     found += check_inertias(log, card, sound, keys)
-    return tuple({one.place.key: one for one in found}.values())  # the log decides
+    decided = {one.place.key: one for one in found}.values()  # the log decides
+    other = [*causes] if len(differing) > 1 or not differing else []
+    return (*decided, *other)
 
 
 def select_card_findings(card: VehicleCard, findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -36,8 +36,6 @@ class PlausibilitySettings:
     """μ of nearly all wet clutches, with the error of the estimate."""
     ratio_tolerance: float = 0.01
     """Relative difference of a ratio that rounding, slip and noise explain."""
-    hold: float = 0.3
-    """Shortest time at one ratio that counts as a gear [s]."""
     inertia_margin: float = 1.6
     """Factor by which the torque balance may leave the design range."""
     least_pressure: float = 0.3

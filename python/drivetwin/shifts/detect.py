@@ -21,6 +21,7 @@ from drivetwin.shifts.candidate import (
     detect_gear_runs,
     find_resting_ratio,
 )
+from drivetwin.shifts.causes import find_causes
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftSettings
@@ -173,20 +174,27 @@ def _limit_phases(shifts: list[Shift], settings: ShiftSettings) -> list[Shift]:
 def require_shifts(log: ShiftLog, card: VehicleCard) -> FoundShifts:
     """Detect shifts like `detect_shifts`; raise NoShiftError with the rejections if all are."""
     found = detect_shifts(log, card)
-    refuse_without_shifts(log, found)
+    refuse_without_shifts(log, card, found)
     return found
 
 
-def refuse_without_shifts(log: ShiftLog, found: FoundShifts) -> None:
-    """Raise NoShiftError with the rejected candidates if no shift was found."""
+def refuse_without_shifts(log: ShiftLog, card: VehicleCard, found: FoundShifts) -> None:
+    """Raise NoShiftError with the rejected candidates if no shift was found.
+
+    A cause in the card or the channel mapping comes first, with its remedy.
+    """
     if found.shifts:
         return
+    causes = find_causes(log, card)
     reasons = "; ".join(
-        f"{one.time[0]:.3f} s to {one.time[1]:.3f} s: {one.reason}" for one in found.rejected
+        [one.cause.rstrip(".") for one in causes]
+        + [f"{one.time[0]:.3f} s to {one.time[1]:.3f} s: {one.reason}" for one in found.rejected]
     )
     raise NoShiftError(
         f"no usable gear shift; {reasons}" if reasons else "no gear shift: one gear throughout",
-        "record from a second before the torque phase to a second after lock-up; "
+        causes[0].remedy
+        if causes
+        else "record from a second before the torque phase to a second after lock-up; "
         "check the ratios on the card and the speed channels with 'drivetwin inspect'",
         Where(file=log.source),
     )

@@ -130,7 +130,7 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLo
     Raises NoShiftError without a shift, MissingChannelError for a missing channel, and if no shift
     can be used DamagedChannelError or IdentificationError.
     """
-    refuse_without_shifts(log, shifts)
+    refuse_without_shifts(log, card, shifts)
     sampler = _Sampler()
     usable, refused = _split_usable(log, card, shifts.shifts)
     kept, left_out = _select(log, card, [one.shift for one in usable], sampler)

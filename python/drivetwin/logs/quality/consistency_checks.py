@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from drivetwin._util.arrays import FloatArray
+from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.roles import AUXILIARY, get_quantity
 from drivetwin.channels.shiftlog import Channel, find_uncovered_ends
@@ -91,6 +94,9 @@ The limits leave room for both; a factor of two, as of a wrong scale, is outside
 
 LEAST_LOAD = 0.2
 """Share of the largest engine torque above which the balance is looked at."""
+
+_HELD = 0.3
+"""Shortest time at a ratio [s] that is a gear held."""
 
 LEAST_SAMPLES = 20
 """Least number of samples in gear."""
@@ -202,6 +208,14 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
         )
 
 
+def _select_long_runs(inside: NDArray[np.bool_], time: FloatArray) -> NDArray[np.bool_]:
+    """Keep the runs (n,) that last as long as a gear held; a slip passes every ratio in between."""
+    kept = np.zeros_like(inside)
+    for first, stop in find_true_runs(inside):
+        kept[first:stop] = time[stop - 1] - time[first] >= _HELD
+    return kept
+
+
 def check_torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> list[Finding]:
     """Return a finding if output and engine torque do not match the ratio of the engaged gear."""
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
@@ -214,7 +228,8 @@ def check_torque_balance(channels: Mapping[str, Channel], card: VehicleCard) -> 
     loaded = (engine.values > LEAST_LOAD * engine.values.max()) & np.isfinite(output)
     for gear in card.gears:
         expected = gear.ratio.value * outlet
-        held = loaded & (np.abs(inlet - expected) < IN_GEAR * np.abs(expected))
+        near = np.abs(inlet - expected) < IN_GEAR * np.abs(expected)
+        held = loaded & _select_long_runs(near, engine.time)
         if np.count_nonzero(held) < LEAST_SAMPLES:
             continue
         driving = card.compute_ratio(gear.name) * float(engine.values[held].sum())
