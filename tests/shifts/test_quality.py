@@ -10,12 +10,14 @@ import pytest
 from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.quality import QUALITY_UNITS, compute_shift_quality
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
-from tests.shifts.fixtures import load_reference, make_card, make_log
+from tests.shifts.fixtures import load_reference, make_card, make_log, shared
 
 _CARD = make_card({"2": 2.0, "3": 1.5})
 _SHIFT = Shift(
@@ -167,3 +169,12 @@ def test_a_vehicle_of_which_next_to_nothing_is_known_has_its_figures() -> None:
     unknown = replace(_CARD, J_vehicle_range=(0.0, 9000.0))
     jerk = compute_shift_quality(_log(np.sin(40.0 * _TIME)), unknown, _SHIFT)["wheel_jerk_max"]
     assert np.isfinite(jerk)
+
+
+@pytest.mark.parametrize("card", ["card", "card2", "card3a", "card4", "card_exact"])
+def test_the_rounding_of_a_card_makes_no_slip_at_lock_up(card: str) -> None:
+    path = shared("cases/rounded_card/Schaltung_23.csv")
+    vehicle = load_card(path.parent / f"{card}.toml")
+    log = read_log(path, vehicle, path.parent / "channels.toml")
+    (shift,) = detect_shifts(log, vehicle).shifts
+    assert abs(shift.quality["slip_at_lockup"]) < 0.01  # rad/s, 0.8 by the ratio of `card2`

@@ -133,7 +133,7 @@ _JERK_BAND = 8.0
 _SLOWEST = 0.2
 """Cut-off over sampling rate from which on there is no jerk of a speed."""
 _FEWEST = 16
-"""Fewest samples of a jerk."""
+"""Fewest samples of a jerk, and of a ratio."""
 _AGAINST = 0.05
 """Share of friction work of the wrong sign up to which the on-coming element alone carries T_o."""
 
@@ -161,6 +161,7 @@ def compute_shift_quality(
 
     `speeds` are those of the log by `resample_speeds`, which spares computing them for each shift.
 
+    Ratios are those of the speeds while each gear is held; of the card if that is too short.
     `slip_at_lockup`: mean slip of the on-coming element (eq. 15) over 0.1 s from lock-up;
     `flare_speed`: input speed above the higher of the two synchronous speeds; `undershoot_speed`:
     below the lower one (both from smoothed speeds, 0 in a clean shift).
@@ -192,16 +193,18 @@ def compute_shift_quality(
     response = _compute_response_time(log, shift)
     figures |= {} if response is None else {"response_time": response}
     speeds = speeds or resample_speeds(log, card)
-    figures |= _compute_speed_excess(speeds, compute_gear_ratios(card), shift)
-    figures |= _compute_residual_slip(speeds, card.get_clutch_ratios(shift.oncoming), shift)
+    stated = compute_gear_ratios(card)
+    ratios = stated | _measure_ratios(speeds, shift)
+    i_c, i_out = card.get_clutch_ratios(shift.oncoming)
+    clutch = i_c, i_out * ratios[shift.end_gear] / stated[shift.end_gear]
+    figures |= _compute_speed_excess(speeds, ratios, shift)
+    figures |= _compute_residual_slip(speeds, clutch, shift)
     torque = _select_output_torque(log, shift)
     if torque is not None:
         J_v = J_vehicle or compute_middle(card.J_vehicle_range)
-        figures |= _measure_torque_hole(torque, compute_gear_ratios(card), shift)
+        figures |= _measure_torque_hole(torque, ratios, shift)
         figures |= _compute_vibration(torque, shift, card.final_drive.value / J_v)
-        figures |= _compute_friction_work(
-            torque, speeds, card.get_clutch_ratios(shift.oncoming), shift
-        )
+        figures |= _compute_friction_work(torque, speeds, clutch, shift)
     else:
         figures |= _compute_speed_jerk(speeds, shift, card.final_drive.value)
     return figures
@@ -270,6 +273,21 @@ def _select_output_torque(log: ShiftLog, shift: Shift) -> _Torque | None:
     if not len(time) or time[-1] < shift.lockup_time:
         return None
     return _Torque(time, _filter_low_pass(values, channel.step, _BAND))
+
+
+def _measure_ratios(speeds: GearboxSpeeds, shift: Shift) -> dict[str, float]:
+    """Ratio of each gear of the shift by the speeds while it is held; none of too few samples.
+
+    A rounded ratio of the card would make a slip of a locked element.
+    """
+    found = {}
+    settled = (shift.after[0] + _REFERENCE, shift.after[1])
+    for gear, span in ((shift.start_gear, shift.before), (shift.end_gear, settled)):
+        first, stop = np.searchsorted(speeds.time, span)
+        part = speeds.select(int(first), int(stop))
+        if part.time.size >= _FEWEST:
+            found[gear] = float(part.input @ part.output / (part.output @ part.output))
+    return found
 
 
 def _compute_speed_excess(
