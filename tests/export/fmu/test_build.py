@@ -271,6 +271,23 @@ def test_a_clutch_opens_where_its_touch_point_is_tuned_above_its_pressure(
     assert instance.get(ONCOMING_TORQUE) == pytest.approx([carried], rel=0.05)
 
 
+def test_an_instance_goes_on_after_a_sample_beyond_any_vehicle(instance: Instance) -> None:
+    inputs = [1500.0, 0.0, 3e5]
+    instance.initialize(np.array(inputs))
+    instance.fmu.doStep(0.0, 0.01)
+    instance.set(INPUTS, [1e308, 0.0, 3e5])
+    with pytest.raises(FMICallException):
+        instance.fmu.doStep(0.01, 0.01)
+    instance.set(INPUTS, inputs)
+    instance.fmu.doStep(0.01, 0.01)
+    told = instance.get(SPEED, TORQUE)
+    instance.fmu.reset()
+    instance.initialize(np.array(inputs))
+    for k in range(2):
+        instance.fmu.doStep(0.01 * k, 0.01)
+    assert instance.get(SPEED, TORQUE) == told
+
+
 @pytest.mark.parametrize(
     ("reference", "value", "told"),
     [

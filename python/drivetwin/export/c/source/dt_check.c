@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The ranges of the parameters, and what tells one set of them from another. */
+/* The ranges of parameters and inputs, and what tells one set of them from another. */
 
 #include "dt_internal.h"
 
@@ -69,6 +69,14 @@ const char *dt_check(const dt_params *p) {
         fault = dt_abs(first - second) > DT_C(1e-3) * dt_abs(first) ? 0 : "i_c * i_out";
     }
     return fault;
+}
+
+int dt_inputs_in_range(const dt_inputs *inputs) {
+    int sound = dt_abs(inputs->engine_torque) <= DT_C(DT_MOST_TORQUE); /* NaN is not */
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        sound = sound && dt_abs(inputs->pressure[j]) <= DT_C(DT_MOST_PRESSURE);
+    }
+    return sound;
 }
 
 /* FNV-1a by whole numbers, with the upper half of each product folded into the lower. */

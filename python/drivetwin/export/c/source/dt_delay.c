@@ -3,6 +3,8 @@
 
 #include "dt_delay.h"
 
+#include "dt_internal.h"
+
 void dt_line_begin(dt_line *line, const dt_delays *delays, const dt_inputs *inputs) {
     line->delays = *delays;
     line->newest = 0;
@@ -69,9 +71,23 @@ static dt_inputs acting(const dt_line *line) {
 dt_status dt_step_delayed(dt_state *state, dt_line *line, const dt_params *params,
                           const dt_inputs *from, const dt_inputs *to, dt_real h,
                           dt_outputs *outputs) {
-    line->sample[line->newest] = *from; /* inputs may jump between steps */
+    if (!dt_inputs_in_range(from) || !dt_inputs_in_range(to)) {
+        return DT_BAD_STATE;
+    }
+    const int newest = line->newest, after = (newest + 1) % DT_LINE;
+    const dt_inputs samples[2] = {line->sample[newest], line->sample[after]};
+    const dt_real intervals[2] = {line->interval[newest], line->interval[after]};
+    line->sample[newest] = *from; /* inputs may jump between steps */
     const dt_inputs first = acting(line);
     append(line, to, h);
     const dt_inputs last = acting(line);
-    return dt_step(state, params, &first, &last, h, outputs);
+    const dt_status status = dt_step(state, params, &first, &last, h, outputs);
+    if (status != DT_OK) {
+        line->newest = newest;
+        line->sample[newest] = samples[0];
+        line->sample[after] = samples[1];
+        line->interval[newest] = intervals[0];
+        line->interval[after] = intervals[1];
+    }
+    return status;
 }

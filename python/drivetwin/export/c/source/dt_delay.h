@@ -42,7 +42,8 @@ typedef struct {
 /** Start a line at inputs that have been constant so far. */
 void dt_line_begin(dt_line *line, const dt_delays *delays, const dt_inputs *inputs);
 
-/** dt_step with inputs linear from `from` to `to` in front of the delay lines. */
+/** dt_step with inputs linear from `from` to `to` in front of the delay lines. Where the result is
+ *  not DT_OK, the line is that of before the call, too. */
 dt_status dt_step_delayed(dt_state *state, dt_line *line, const dt_params *params,
                           const dt_inputs *from, const dt_inputs *to, dt_real h,
                           dt_outputs *outputs);

@@ -92,6 +92,8 @@ int dt_first_fall(const dt_real *c, int order, dt_real h, dt_real *at);
 dt_event dt_earliest(const dt_expansion *e, const dt_mechanism *m, const dt_params *p,
                      const dt_state *s, dt_real h);
 
+/** Whether inputs are numbers in range. */
+int dt_inputs_in_range(const dt_inputs *inputs);
 /** What tells one set of parameters from another. */
 uint64_t dt_mark(const dt_params *p);
 /** Whether the slip of a row is zero within `round_off` of the speeds behind it. */

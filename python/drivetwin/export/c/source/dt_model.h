@@ -40,12 +40,14 @@ extern "C" {
 #define DT_PIECES 64 /**< most pieces of one step, a piece ending at an event or where the
                           truncation error asks for it */
 #endif
+#define DT_MOST_TORQUE 1e7   /**< largest |engine torque|, N m: beyond any vehicle, not beyond float */
+#define DT_MOST_PRESSURE 1e9 /**< largest |pressure|, Pa: steel yields before */
 
 /** What a call came to. */
 typedef enum {
     DT_OK = 0,
     DT_BAD_PARAMETER,   /**< a parameter is out of range; dt_check names it */
-    DT_BAD_STATE,       /**< a state, input or step is not a finite number in range */
+    DT_BAD_STATE,       /**< a state, input, step or output is not a finite number in range */
     DT_TOO_MANY_EVENTS, /**< DT_PIECES pieces did not reach the end of the step */
     DT_UNDECIDED,       /**< no friction mode fits; efficiencies that lock themselves */
     DT_ENGINE_STALLED   /**< under the dissipative loss law the engine stands or turns backward */
@@ -109,8 +111,8 @@ typedef struct {
 
 /** Inputs at one instant. */
 typedef struct {
-    dt_real engine_torque;         /**< N m */
-    dt_real pressure[DT_CLUTCHES]; /**< gauge pressure, Pa */
+    dt_real engine_torque;         /**< N m, at most DT_MOST_TORQUE in size */
+    dt_real pressure[DT_CLUTCHES]; /**< gauge pressure, Pa, at most DT_MOST_PRESSURE in size */
 } dt_inputs;
 
 /** Everything that lives from step to step. Copy it to save, copy it back to restore. */
@@ -152,7 +154,7 @@ typedef struct {
 /** Null where all parameters are in range, else the name of the first that is not. */
 const char *dt_check(const dt_params *params);
 
-/** Take up a start at given inputs. */
+/** Take up a start at given inputs. State and outputs are written where the result is DT_OK. */
 dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *start,
                    const dt_inputs *inputs, dt_outputs *outputs);
 
@@ -160,8 +162,8 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
  *
  *  Locks and break-aways are located inside the step to round-off. Inputs may jump between steps,
  *  and so may parameters, whose ranges are checked again.
- *  Where the result is not DT_OK the state is that of the instant the run ended, and the outputs
- *  are those of the last piece that was completed, if any. */
+ *  Where the result is not DT_OK, state and outputs are those of before the call, so that the run
+ *  goes on with the next sound inputs. */
 dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *from,
                   const dt_inputs *to, dt_real h, dt_outputs *outputs);
 

@@ -323,13 +323,21 @@ static int is_finite(const dt_observer *o) {
     return finite;
 }
 
+/* The other estimates are parts of the observer's own state. */
+static int estimates_are_finite(const dt_estimates *out) {
+    int finite = dt_is_finite(out->output_torque) && dt_is_finite(out->output_torque_std);
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        finite = finite && dt_is_finite(out->clutch_torque[j]) && dt_is_finite(out->slip[j]);
+    }
+    return finite;
+}
+
 dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tuning *tuning,
                      const dt_measured *now, dt_real h, dt_estimates *estimates) {
     const dt_real limit = DT_C(DT_OBSERVER_SUBSTEP) * DT_C(DT_OBSERVER_SUBSTEPS);
-    const int sound = dt_is_finite(now->engine_speed) && dt_is_finite(now->output_speed) &&
-                      dt_is_finite(now->inputs.engine_torque) &&
-                      dt_is_finite(now->inputs.pressure[0]) &&
-                      dt_is_finite(now->inputs.pressure[1]);
+    const int sound = dt_abs(now->engine_speed) <= DT_C(DT_MOST_SPEED) &&
+                      dt_abs(now->output_speed) <= DT_C(DT_MOST_SPEED) &&
+                      dt_inputs_in_range(&now->inputs);
     if (!sound || !(h > DT_C(0)) || h > limit) {
         return DT_BAD_STATE;
     }
@@ -353,10 +361,12 @@ dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tu
     if (observer->locked >= 0) {
         correct(observer, m.row[observer->locked], DT_C(0), NO_SLIP);
     }
-    if (!is_finite(observer)) {
+    dt_estimates found;
+    fill_estimates(&found, observer, &m, params, &now->inputs);
+    if (!is_finite(observer) || !estimates_are_finite(&found)) {
         *observer = before;
         return DT_BAD_STATE;
     }
-    fill_estimates(estimates, observer, &m, params, &now->inputs);
+    *estimates = found;
     return DT_OK;
 }

@@ -20,6 +20,7 @@ extern "C" {
 
 #define DT_OBSERVED 7            /**< states of the filter */
 #define DT_OBSERVER_SUBSTEP 1e-3 /**< longest prediction at once, s */
+#define DT_MOST_SPEED 1e5        /**< largest |measured speed|, rad/s: beyond any driveline */
 #define DT_OBSERVER_SUBSTEPS 32  /**< most predictions in one call: calls every 32 ms or faster */
 
 /** Index of a state of the filter; the first four are those of the model. */
@@ -46,8 +47,8 @@ typedef struct {
 /** What is measured, and the inputs that were at work since the last call. */
 typedef struct {
     dt_inputs inputs;
-    dt_real engine_speed; /**< rad/s */
-    dt_real output_speed; /**< rad/s */
+    dt_real engine_speed; /**< rad/s, at most DT_MOST_SPEED in size */
+    dt_real output_speed; /**< rad/s, at most DT_MOST_SPEED in size */
 } dt_measured;
 
 /** Estimates with standard deviations. */
@@ -74,8 +75,8 @@ void dt_observer_begin(dt_observer *observer, const dt_params *params, const dt_
 void dt_observer_resume(dt_observer *observer, const dt_params *params, const dt_measured *now);
 
 /** Take in what is measured `h` [s] after the last call. Returns DT_BAD_STATE, and leaves the
- *  observer as it is, where a value is not finite or h is not in range; also where what it holds
- *  would not be finite, as after a start at speeds that were not: begin anew. */
+ *  observer and the estimates as they are, where a value or h is not in range; also where one of
+ *  them would not be finite, as after a start at speeds that were not: begin anew. */
 dt_status dt_observe(dt_observer *observer, const dt_params *params, const dt_tuning *tuning,
                      const dt_measured *now, dt_real h, dt_estimates *estimates);
 

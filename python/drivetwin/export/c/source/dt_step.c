@@ -32,14 +32,6 @@ static int has_jumped(const dt_state *s, const dt_inputs *now) {
     return jumped;
 }
 
-static int inputs_are_finite(const dt_inputs *u) {
-    int finite = dt_is_finite(u->engine_torque);
-    for (int j = 0; j < DT_CLUTCHES; ++j) {
-        finite = finite && dt_is_finite(u->pressure[j]);
-    }
-    return finite;
-}
-
 /* Forget what was decided by other parameters, but for locks that are at rest by these as well. */
 static void let_go(dt_state *s, const dt_params *p) {
     dt_mechanism m;
@@ -155,6 +147,16 @@ static void fill_outputs(dt_outputs *out, const dt_state *s, const dt_params *p,
     }
 }
 
+static int outputs_are_finite(const dt_outputs *out) {
+    int finite = dt_is_finite(out->engine_speed) && dt_is_finite(out->output_speed) &&
+                 dt_is_finite(out->wheel_speed) && dt_is_finite(out->twist) &&
+                 dt_is_finite(out->output_torque);
+    for (int j = 0; j < DT_CLUTCHES; ++j) {
+        finite = finite && dt_is_finite(out->clutch_torque[j]) && dt_is_finite(out->slip[j]);
+    }
+    return finite;
+}
+
 /* Bring a clutch to zero slip by the impulse of its torque, of which the input gear loses its part
  * as of any torque: an impulse that accelerates the engine comes through it from behind. */
 static void lock(dt_state *s, const dt_params *p, int row) {
@@ -169,8 +171,21 @@ static void lock(dt_state *s, const dt_params *p, int row) {
     }
 }
 
-dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *start,
-                   const dt_inputs *inputs, dt_outputs *outputs) {
+/* Hand over what a call came to where it is sound. */
+static dt_status finish(dt_status status, dt_state *state, const dt_state *next,
+                        dt_outputs *outputs, const dt_outputs *found) {
+    if (status == DT_OK && !outputs_are_finite(found)) {
+        return DT_BAD_STATE;
+    }
+    if (status == DT_OK) {
+        *state = *next;
+        *outputs = *found;
+    }
+    return status;
+}
+
+static dt_status begin(dt_state *state, const dt_params *params, const dt_start *start,
+                       const dt_inputs *inputs, dt_outputs *outputs) {
     const dt_state blank = {{0}, {0}, {DT_OPEN}, {0}, {0}, 0, 0, {0, {0}}, 0};
     const dt_inputs still = {0, {0}};
     dt_expansion e;
@@ -183,7 +198,7 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
     state->x[DT_OUTPUT] = start->output_speed;
     state->x[DT_WHEEL] = start->wheel_speed;
     state->x[DT_TWIST] = start->twist;
-    int sound = inputs_are_finite(inputs) && start->locked >= 0 && start->locked <= DT_CLUTCHES;
+    int sound = dt_inputs_in_range(inputs) && start->locked >= 0 && start->locked <= DT_CLUTCHES;
     for (int i = 0; i < DT_STATES; ++i) {
         sound = sound && dt_is_finite(state->x[i]);
     }
@@ -210,9 +225,18 @@ dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *sta
     return DT_OK;
 }
 
-dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *from,
-                  const dt_inputs *to, dt_real h, dt_outputs *outputs) {
-    if (!(h > DT_C(0)) || !dt_is_finite(h) || !inputs_are_finite(from) || !inputs_are_finite(to)) {
+dt_status dt_begin(dt_state *state, const dt_params *params, const dt_start *start,
+                   const dt_inputs *inputs, dt_outputs *outputs) {
+    dt_state next;
+    dt_outputs found;
+    const dt_status status = begin(&next, params, start, inputs, &found);
+    return finish(status, state, &next, outputs, &found);
+}
+
+static dt_status step(dt_state *state, const dt_params *params, const dt_inputs *from,
+                      const dt_inputs *to, dt_real h, dt_outputs *outputs) {
+    if (!(h > DT_C(0)) || !dt_is_finite(h) || !dt_inputs_in_range(from) ||
+        !dt_inputs_in_range(to)) {
         return DT_BAD_STATE;
     }
     const dt_inputs rate = rate_of(from, to, h);
@@ -257,4 +281,12 @@ dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *fro
         }
     }
     return status == DT_OK ? DT_TOO_MANY_EVENTS : status;
+}
+
+dt_status dt_step(dt_state *state, const dt_params *params, const dt_inputs *from,
+                  const dt_inputs *to, dt_real h, dt_outputs *outputs) {
+    dt_state next = *state;
+    dt_outputs found;
+    const dt_status status = step(&next, params, from, to, h, &found);
+    return finish(status, state, &next, outputs, &found);
 }

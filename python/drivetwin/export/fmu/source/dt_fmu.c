@@ -35,7 +35,7 @@ static const size_t output_places[] = {
 static const char *const faults[] = {
     "completed",
     "a parameter is out of range",
-    "a state or input is not a finite number in range",
+    "a state, input or output is not a finite number in range",
     "more events in one step than can be separated",
     "no friction mode fits",
     "the engine stands or turns backward, which the dissipative loss law does not cover"};
@@ -223,6 +223,7 @@ int dt_fmu_do_step(dt_fmu *fmu, double time, double h) {
     if (fault != 0) {
         return fail(fmu, "parameter out of range: ", fault);
     }
+    const dt_fmu_data before = *now;
     if (!now->has_stepped) {
         dt_line_begin(&now->line, &dt_twin_delays, &now->inputs);
         now->has_stepped = 1;
@@ -233,6 +234,7 @@ int dt_fmu_do_step(dt_fmu *fmu, double time, double h) {
         const dt_status status = dt_step_delayed(&now->state, &now->line, &now->params,
                                                  &now->inputs, &to, h / parts, &now->outputs);
         if (status != DT_OK) {
+            *now = before; /* the parts done so far as well */
             return fail(fmu, "step failed: ", faults[status]);
         }
         now->inputs = to;
