@@ -12,9 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import ReaderFailureError
-from drivetwin.logs.formats.mat import refuse_expansion
-from tests.workbench.bad_files import mat_bomb
+from drivetwin.logs.formats.mat import open_mat
+from drivetwin.logs.formats.mat_size import refuse_expansion
+from tests.workbench.bad_files import hdf5_bomb, mat_bomb
 
 LIMIT = 2**31
 
@@ -24,15 +26,41 @@ def test_a_sound_file_claims_about_what_it_holds(tmp_path: Path, compressed: boo
     path = tmp_path / "log.mat"
     savemat(path, {"a": np.zeros(10_000), "b": np.ones(5)}, do_compression=compressed)
     refuse_expansion(path, 81_000)
-    with pytest.raises(ReaderFailureError, match="expands"):
+    with pytest.raises(ReaderFailureError, match="expand to"):
         refuse_expansion(path, 79_000)
 
 
 def test_a_bomb_is_refused_without_being_expanded(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     path.write_bytes(mat_bomb())
-    with pytest.raises(ReaderFailureError, match=r"3\.1 GB"):
+    with pytest.raises(ReaderFailureError, match="GB or more"):
         refuse_expansion(path, LIMIT)
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_small_whole_numbers_grow_to_float64(tmp_path: Path, nested: bool) -> None:
+    """0.1 MB of constant signals that take 1.1 GB as numbers."""
+    signal = np.zeros(70_000_000, np.int8)
+    held = {"time": signal, "data": signal}
+    path = tmp_path / "log.mat"
+    savemat(path, {"log": {"inner": held}} if nested else held, do_compression=True)
+    assert path.stat().st_size < 300_000
+    with (
+        pytest.raises(ReaderFailureError, match=r"0\.56 GB or more.* is 0\.54 GB") as caught,
+        open_mat(path, ReadOptions()),
+    ):
+        pass
+    assert "only the channels that are needed" in caught.value.remedy
+
+
+def test_a_file_of_version_7_3_is_refused_by_the_size_of_its_data(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    path.write_bytes(hdf5_bomb())
+    with (
+        pytest.raises(ReaderFailureError, match="expand to 32"),
+        open_mat(path, ReadOptions()),
+    ):
+        pass
 
 
 @given(rest=st.binary(max_size=200))

@@ -13,19 +13,22 @@ the name), name and data.
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.errors import FileFormatError, MissingChannelError, ReaderFailureError, Where
-from drivetwin.logs.formats.guarded import compute_parser_limits
+from drivetwin.errors import FileFormatError, MissingChannelError, Where
+from drivetwin.logs.formats.mat_size import (
+    compute_expansion_limit,
+    refuse_expansion,
+    refuse_hdf5_expansion,
+)
 from drivetwin.logs.raw import (
     RawLog,
     Recording,
@@ -42,7 +45,6 @@ _PLAIN = (
 
 _HEADER = 128
 """Bytes of the header of version 5; elements follow, each with a tag of type and length."""
-_COMPRESSED = 15
 _HEAD4 = 20
 _BYTES4 = (8, 4, 4, 2, 2, 1)
 """Bytes of a number by its kind in version 4: double, single, four kinds of integers."""
@@ -86,7 +88,7 @@ def _make_no_signal_error(
 def _read_tree(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    refuse_expansion(path, compute_parser_limits(path).memory)
+    refuse_expansion(path, compute_expansion_limit(path.stat().st_size))
     _check_version4(path)
     content = loadmat(path, struct_as_record=False, squeeze_me=True, appendmat=False)
     return {name: _to_plain(v) for name, v in content.items() if not name.startswith("__")}
@@ -103,8 +105,10 @@ def _to_plain(value: Any) -> Any:
 
 
 def _read_hdf5_tree(path: Path) -> dict[str, Any]:
-    import_extra("h5py", "io", "a MATLAB 7.3 file", path)
+    h5py = import_extra("h5py", "io", "a MATLAB 7.3 file", path)
     pymatreader = import_extra("pymatreader", "io", "a MATLAB 7.3 file", path)
+    with h5py.File(path, "r") as file:
+        refuse_hdf5_expansion(file, path, compute_expansion_limit(path.stat().st_size))
     content: dict[str, Any] = pymatreader.read_mat(str(path))
     return {
         name: _split_struct_array(v) for name, v in content.items() if not name.startswith("__")
@@ -120,46 +124,6 @@ def _split_struct_array(value: Any) -> Any:
     if lists and len(lists) == len(value) and len({len(item) for item in lists}) == 1:
         return [dict(zip(value, row, strict=True)) for row in zip(*lists, strict=True)]
     return value
-
-
-def refuse_expansion(path: Path, limit: int) -> None:
-    """Raise ReaderFailureError if a file of version 5 declares variables above `limit` [bytes].
-
-    Otherwise the reader would expand a file of a few megabytes for half a minute before it fails.
-    """
-    total = 0
-    with path.open("rb") as file:
-        head = file.read(_HEADER)
-        if not head.startswith(b"MATLAB 5.0"):
-            return
-        for kind, size in _iterate_elements(file, "<" if head.endswith(b"IM") else ">"):
-            start = file.tell()
-            total += _read_declared_size(file.read(256), head) if kind == _COMPRESSED else size
-            file.seek(start + size)
-    if total > limit:
-        raise ReaderFailureError(
-            f"the file says that it expands to {total / 1e9:.1f} GB, at most {limit / 1e9:.1f} GB "
-            "are read",
-            "hand in a shorter log, or only the channels that are needed",
-            Where(file=str(path)),
-        )
-
-
-def _read_declared_size(packed: bytes, head: bytes) -> int:
-    """Read the declared size [bytes] of a compressed variable; 0 if its header cannot be read."""
-    try:
-        tag = zlib.decompressobj().decompress(packed, 8)
-    except zlib.error:
-        return 0
-    order = "<" if head.endswith(b"IM") else ">"
-    return int(struct.unpack(f"{order}II", tag)[1]) if len(tag) == 8 else 0
-
-
-def _iterate_elements(file: BinaryIO, order: str) -> Iterator[tuple[int, int]]:
-    """Type and length of each element; the caller leaves the file where the next one starts."""
-    while len(tag := file.read(8)) == 8:
-        kind, length = struct.unpack(f"{order}II", tag)
-        yield kind, length
 
 
 def is_version4(head: bytes) -> bool:
