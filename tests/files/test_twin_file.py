@@ -38,7 +38,16 @@ from tests.report.sample import card, identification
         ("transmission.elements.B2.i_c", 0.0, "must not be 0"),
         ("parameters.k_o.value", 0.0, "it must be above zero"),
         ("parameters.k_o.unit", "kN*m/rad", "read in 'N*m/rad'"),
-        ("friction.B3.stribeck.v_s", 0.0, "it must be above zero"),
+        ("friction.B3.stribeck.v_s", 0.0, "greater than 0"),
+        ("friction.B3.stribeck.mu_c", -0.1, "greater than or equal to 0"),
+        ("friction.B3.mu", [-0.1, 0.1], "the range is 0 and above"),
+        ("friction.B3.mu", [np.inf, 0.1], "finite"),
+        ("friction.B3.mu_hi", [np.inf, 0.2], "finite"),
+        ("friction.B3", {"mu_lo": 0.5}, "outside its band, mu_lo = 0.5"),
+        ("friction.B3", {"mu_hi": -0.2}, "mu_hi = -0.2"),
+        ("friction.B3.gain_std_m3", np.inf, "finite"),
+        ("parameters.k_o.std_total", np.inf, "finite"),
+        ("parameters.k_o.std_noise", -1.0, "greater than or equal to 0"),
         ("friction.B3.slip", None, "the slips do not increase"),
     ],
 )
@@ -50,7 +59,11 @@ def test_a_wrong_entry_is_told_by_its_key(tmp_path: Path, key: str, value: Any, 
     *parents, last = key.split(".")
     for part in parents:
         table = table[part]
-    table[last] = list(reversed(table[last])) if value is None else value
+    if isinstance(value, dict):
+        ((name, number),) = value.items()
+        table[last][name] = [number] * len(table[last][name])
+    else:
+        table[last] = list(reversed(table[last])) if value is None else value
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
     with pytest.raises(ResultFileError) as refused:
         load_twin(path)

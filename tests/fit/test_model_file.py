@@ -67,6 +67,26 @@ value = 1.5
 std = 0.5
 """
 
+AIR = """[[elements]]
+type = "road_load"
+name = "air"
+node = "end"
+constant = 1.0
+rolling = 0.0
+aero = -0.5
+
+"""
+BEARING = """[[elements]]
+type = "bearing"
+name = "bearing"
+a = "end"
+b = "ground"
+speed = [0.0, 1.0]
+torque = [1.0, -1.0]
+peak = 1.0
+
+"""
+
 names = st.text(min_size=1, max_size=8).filter(lambda text: "." not in text)
 numbers = st.floats(-1e6, 1e6).map(lambda value: value if abs(value) > 1e-100 else 0.0)
 positive = st.floats(1e-6, 1e6)
@@ -209,6 +229,10 @@ def read_text(folder: Path, text: str) -> tuple[NetworkModel, ModelChannels]:
             ("[start]", "[run]\nend_s = 1.0\n[run.inputs.U]\npoints=[[0.0,1.0]]\n[start]"),
             "inputs.U",
         ),
+        (("inertia = 2.0", "inertia = -2.0"), "-2 of inertia 'wheel' is out of range, ≥ 0"),
+        (("[outputs", AIR + "[outputs"), "elements[4].aero"),
+        (("[outputs", AIR + "[outputs"), "-0.5 of road_load 'air' is out of range, ≥ 0"),
+        (("[outputs", BEARING + "[outputs"), "elements[4].torque"),
         (("[start]", "[start"), "no valid TOML"),
     ],
 )

@@ -136,10 +136,15 @@ def is_extreme(value: float) -> bool:
     return 0.0 < size < 10.0**-MAX_EXPONENT or 10.0**MAX_EXPONENT < size < math.inf
 
 
-def validate_schema(document: Mapping[str, Any], model: type[BaseModel]) -> list[Fault]:
-    """Return every fault that the schema `model` finds in `document`, in file order."""
+def validate_schema(
+    document: Mapping[str, Any], model: type[BaseModel], context: Mapping[str, Any] | None = None
+) -> list[Fault]:
+    """Return every fault that the schema `model` finds in `document`, in file order.
+
+    `context` is that of the validators of pydantic.
+    """
     try:
-        model.model_validate(document)
+        model.model_validate(document, context=context)
     except ValidationError as error:
         schema = model.model_json_schema()
         return [

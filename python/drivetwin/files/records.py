@@ -15,11 +15,13 @@ from typing import Annotated, Any, Self, TypeVar
 import numpy as np
 import tomlkit
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
     FiniteFloat,
+    ValidationInfo,
     model_validator,
 )
 
@@ -42,7 +44,30 @@ from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
 
-OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(convert_nonfinite)]
+READING = {"reads": True}
+"""Context of a validation that reads a file: a number beyond its range is a fault of the file.
+
+A record of a result is written as computed, so that a damaged result can still be looked at.
+"""
+
+
+def _convert_missing(value: object, info: ValidationInfo) -> object:
+    """Return None for NaN, and for an infinity that was computed; a file may not state one."""
+    is_stated = info.context == READING and value in (math.inf, -math.inf)
+    return value if is_stated else convert_nonfinite(value)
+
+
+def _check_friction(mu: float, info: ValidationInfo) -> float:
+    """Refuse a negative friction coefficient of a file."""
+    if info.context == READING and mu < 0.0:
+        raise ValueError(f"{mu:g} is no friction coefficient; the range is 0 and above")
+    return mu
+
+
+OptionalFloat = Annotated[FiniteFloat | None, BeforeValidator(_convert_missing)]
+Deviation = Annotated[Annotated[FiniteFloat, Field(ge=0)] | None, BeforeValidator(_convert_missing)]
+"""A standard deviation; None where it is unknown."""
+FrictionCoefficient = Annotated[FiniteFloat, AfterValidator(_check_friction)]
 Interval = tuple[FiniteFloat, FiniteFloat]
 
 
@@ -76,23 +101,31 @@ class FrictionRecord(Record):
     """μ over |slip| [rad/s] of one element with its 95 % band, over the slip range seen."""
 
     slip: list[FiniteFloat]
-    mu: list[FiniteFloat]
+    mu: list[FrictionCoefficient]
     mu_lo: list[OptionalFloat]
     mu_hi: list[OptionalFloat]
     stribeck: Stribeck | None = None
     stribeck_covariance: list[list[FiniteFloat]] | None = None
     method: str
     gain_m3: OptionalFloat = None
-    gain_std_m3: OptionalFloat = None
+    gain_std_m3: Deviation = None
     gain_assumed: bool = False
     verdict: Verdict = Verdict.IDENTIFIED
     reason: str = ""
 
     @model_validator(mode="after")
-    def _check_array_sizes(self) -> Self:
+    def _check_curve(self, info: ValidationInfo) -> Self:
         lengths = {len(self.slip), len(self.mu), len(self.mu_lo), len(self.mu_hi)}
         if len(lengths) != 1 or not self.slip:
             raise ValueError("slip, mu, mu_lo and mu_hi must be of one length, at least 1")
+        bands = zip(self.slip, self.mu_lo, self.mu, self.mu_hi, strict=True)
+        for slip, low, mu, high in bands if info.context == READING else ():
+            below, above = mu if low is None else low, mu if high is None else high
+            if not below <= mu <= above:
+                raise ValueError(
+                    f"mu = {mu:g} at {slip:g} rad/s is outside its band, mu_lo = {below:g} to "
+                    f"mu_hi = {above:g}"
+                )
         return self
 
     @model_validator(mode="before")
@@ -147,6 +180,9 @@ class CovarianceRecord(Record):
         size = len(self.ids)
         if len(self.matrix) != size or any(len(row) != size for row in self.matrix):
             raise ValueError(f"matrix must be {size} by {size}, as ids")
+        for place, name in enumerate(self.ids):
+            if self.matrix[place][place] < 0.0:
+                raise ValueError(f"the variance of {name} is negative; the range is 0 and above")
         return self
 
 
@@ -166,9 +202,9 @@ class ParameterRecord(Record):
 
     value: OptionalFloat
     unit: str
-    std_noise: OptionalFloat = None
+    std_noise: Deviation = None
     ci95: OptionalInterval = None
-    std_total: OptionalFloat = None
+    std_total: Deviation = None
     ci95_total: OptionalInterval = None
     verdict: Verdict
     method: str
@@ -405,8 +441,8 @@ def read_record(path: Path | str, parse: Callable[[str], Any], schema: str, mode
     if not isinstance(tree, dict):
         raise ResultFileError("cannot be read: it is no table", _AGAIN, where)
     _check_schema(tree.get("schema"), schema, str(path))
-    raise_faults(validate_schema(tree, model), ResultFileError, str(path), _AGAIN)
-    return model.model_validate(tree)
+    raise_faults(validate_schema(tree, model, READING), ResultFileError, str(path), _AGAIN)
+    return model.model_validate(tree, context=READING)
 
 
 def _check_schema(found: object, known: str, file: str) -> None:

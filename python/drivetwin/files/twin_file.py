@@ -197,9 +197,6 @@ def _check_friction(content: TwinFile) -> Iterator[Fault]:
             yield Fault(key, f"no element {name!r}{suggest_spelling(name, elements)}")
         if any(a >= b for a, b in zip(curve.slip, curve.slip[1:], strict=False)):
             yield Fault(f"{key}.slip", "the slips do not increase")
-        if curve.stribeck is not None and curve.stribeck.v_s <= 0.0:
-            text = f"{curve.stribeck.v_s:g} is impossible; it must be above zero"
-            yield Fault(f"{key}.stribeck.v_s", text)
 
 
 def _check_actuators(content: TwinFile) -> Iterator[Fault]:

@@ -29,7 +29,14 @@ from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
 from drivetwin.fit.starts import list_starts
 from drivetwin.fit.unknown import Unknown, require_known_places, resolve_unknown
-from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
+from drivetwin.simulation.element_schema import (
+    ELEMENT_FIELDS,
+    Limit,
+    find_element_faults,
+    iterate_out_of_range,
+    list_inputs,
+    refuse_faults,
+)
 from drivetwin.simulation.network import Start
 
 Positive = Annotated[float, Field(gt=0)]
@@ -136,6 +143,30 @@ class ModelTable(StrictModel):
     name: str = "driveline"
 
 
+_STATED = {("road_load", "aero"): Limit(0.0, None, None, ())}
+"""Ranges by element and field that are narrower in a file. The core takes other numbers, because
+the search of a fit crosses them."""
+
+
+def _list_range_faults(elements: Sequence[Mapping[str, Any]]) -> list[Fault]:
+    """List the numbers of elements outside the range that the core or a file has for them."""
+    faults = []
+    for place, element in enumerate(elements):
+        kind = element["type"]
+        fields = {
+            name: one._replace(limit=_STATED.get((kind, name), one.limit))
+            for name, one in ELEMENT_FIELDS[kind].items()
+        }
+        faults += [
+            Fault(
+                f"elements[{place}].{key}",
+                f"{value:g} of {kind} {element['name']!r} is out of range, {limit.describe()}",
+            )
+            for key, value, limit in iterate_out_of_range(element, fields)
+        ]
+    return faults
+
+
 class NetworkFile(StrictModel):
     """A model file."""
 
@@ -178,6 +209,7 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
     file = NetworkFile.model_validate(document)
     elements = [_to_plain(one) for one in file.elements]
     refuse_faults(find_element_faults(elements))
+    raise_faults(_list_range_faults(elements), ModelFileError, str(path), _REMEDY)
     used = [name for one in elements for name in list_inputs(one)]
     _refuse_unused(file, used, str(path))
     needed = dict.fromkeys([*(name for name in file.inputs if name in used), *used])

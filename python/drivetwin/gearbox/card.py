@@ -38,9 +38,11 @@ from drivetwin.gearbox.spec import (
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.simulation.element_schema import GROUND
 from drivetwin.vehicle.converter import ConverterTable
+from drivetwin.vehicle.spec import MOST_INERTIA
 
 Name = Annotated[str, Field(min_length=1)]
 Teeth = Annotated[int, Field(ge=1)]
+Inertia = Annotated[float, Field(ge=0, le=MOST_INERTIA)]
 
 
 class SetTable(StrictModel):
@@ -53,7 +55,7 @@ class SetTable(StrictModel):
     sun_teeth: Teeth | None = None
     ring_teeth: Teeth | None = None
     dual_pinion: bool = False
-    planet_inertia_kgm2: float = Field(default=0.0, ge=0)
+    planet_inertia_kgm2: Inertia = 0.0
 
     @model_validator(mode="after")
     def _one_ratio(self) -> SetTable:
@@ -232,7 +234,7 @@ class GearboxFile(StrictModel):
     pairs: dict[str, PairTable] = Field(default_factory=dict)
     elements: dict[str, ElementTable] = Field(min_length=1)
     gears: list[GearTable] = Field(min_length=1)
-    inertia_kgm2: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
+    inertia_kgm2: dict[str, Inertia] = Field(default_factory=dict)
     friction: FrictionEntry | None = None
     drive: Annotated[Drive, FromTable] | None = None
     converter: ConverterStageTable | None = None

@@ -19,6 +19,7 @@ from drivetwin.errors import CardError, InputError, ReductionError, suggest_spel
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.driveline import OutputSide
 from drivetwin.simulation.dual_clutch import FrictionTable, RoadLoad, Stribeck
+from drivetwin.vehicle.spec import MOST_INERTIA
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,12 @@ class Drive:
     [s] of the torque and inertia phases.
     """
 
-    engine_inertia: Annotated[float, Field(gt=0, alias="engine_inertia_kgm2")]
+    engine_inertia: Annotated[float, Field(gt=0, le=MOST_INERTIA, alias="engine_inertia_kgm2")]
     engine_torque: Annotated[float, Field(gt=0, alias="engine_torque_Nm")]
     overrun_torque: Annotated[float, Field(lt=0, alias="overrun_torque_Nm")]
     engine_speed: Annotated[float, Field(gt=0, alias="engine_speed_rpm"), IN_RPM]
     final_drive: Annotated[float, Field(gt=0)]
-    vehicle_inertia: Annotated[float, Field(gt=0, alias="vehicle_inertia_kgm2")]
+    vehicle_inertia: Annotated[float, Field(gt=0, le=MOST_INERTIA, alias="vehicle_inertia_kgm2")]
     shaft_stiffness: Annotated[float, Field(gt=0, alias="shaft_stiffness_Nm_rad")]
     shaft_damping: Annotated[float, Field(ge=0, alias="shaft_damping_Nms_rad")]
     load_torque: Annotated[float, Field(alias="load_torque_Nm")] = 0.0

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from drivetwin.errors import InputError
 from drivetwin.simulation.serialize import (
@@ -57,9 +58,9 @@ ORDERS = range(1, 15)
 class Stribeck:
     """μ(s) = mu_c + (mu_s - mu_c)·exp(-|s|/v_s) + mu_v·|s|; s and v_s in rad/s, mu_v in s/rad."""
 
-    mu_c: float
-    mu_s: float
-    v_s: float
+    mu_c: Annotated[float, Field(ge=0)]
+    mu_s: Annotated[float, Field(ge=0)]
+    v_s: Annotated[float, Field(gt=0)]
     mu_v: float
 
     def evaluate(self, slip: FloatArray) -> FloatArray:

@@ -49,6 +49,15 @@ class Limit(NamedTuple):
         bounds += (("≠", value) for value in self.excluded)
         return ", ".join(f"{sign} {value:g}" for sign, value in bounds if value is not None)
 
+    def holds(self, value: float) -> bool:
+        """Return True if a number is in the range."""
+        return (
+            (self.least is None or value >= self.least)
+            and (self.above is None or value > self.above)
+            and (self.most is None or value <= self.most)
+            and value not in self.excluded
+        )
+
 
 class Field(NamedTuple):
     """Field of an element or group.
@@ -129,6 +138,27 @@ def find_element_faults(elements: Sequence[Mapping[str, Any]]) -> list[str]:
         given = {key: value for key, value in element.items() if key not in ("type", "name")}
         faults += (f"{name}: {fault}" for fault in _find_faults(given, ELEMENT_FIELDS[str(kind)]))
     return faults
+
+
+def iterate_out_of_range(
+    given: Mapping[str, Any], fields: Mapping[str, Field]
+) -> Iterator[tuple[str, float, Limit]]:
+    """Yield key, value and range of each number that the core would refuse.
+
+    `given` are sound in form, see `find_element_faults`.
+    """
+    for key, value in given.items():
+        field = fields.get(key)
+        if field is None:
+            continue
+        if isinstance(value, Mapping):
+            inner = next((one for one in field.group if value.keys() <= one.keys()), {})
+            for path, number, limit in iterate_out_of_range(value, inner):
+                yield f"{key}.{path}", number, limit
+        elif field.limit is not None:
+            for each in np.ravel(value).tolist() if isinstance(value, list | tuple) else [value]:
+                if is_number(each) and not field.limit.holds(each):
+                    yield key, float(each), field.limit
 
 
 def refuse_faults(faults: Sequence[str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -24,6 +24,7 @@ from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.effects import EffectPrior
 from drivetwin.vehicle.spec import (
+    MOST_INERTIA,
     ClutchGeometry,
     ElementSpec,
     Gear,
@@ -35,6 +36,14 @@ from drivetwin.vehicle.spec import (
     describe_ratio,
     parse_teeth,
 )
+
+_Table = TypeVar("_Table", bound=StrictModel)
+MOST_PRESSURE = 1e4
+"""Largest fill pressure of a card [bar]: steel yields before."""
+MOST_GAIN = 1e3
+"""Largest gain of a card [m^3]: a thousand of the largest clutches of ships."""
+MOST_PEAK = 1e3
+"""Largest ratio of static to kinetic capacity of a card [-]."""
 
 
 class PriorTable(StrictModel):
@@ -79,6 +88,23 @@ def _parse_bare_value(value: object) -> object:
 PriorEntry = Annotated[
     PriorTable, BeforeValidator(_parse_bare_value, json_schema_input_type=PriorTable | float)
 ]
+
+
+def _limit_prior(most: float) -> AfterValidator:
+    """Return a validator of a value and its standard deviation, both `most` at most."""
+
+    def check(table: _Table) -> _Table:
+        for name in ("value", "std"):
+            number = getattr(table, name)
+            if number is not None and number > most:
+                raise ValueError(f"{name} = {number:g} is beyond 0 to {most:g}")
+        return table
+
+    return AfterValidator(check)
+
+
+PressurePrior = Annotated[PriorEntry, _limit_prior(MOST_PRESSURE)]
+InertiaPrior = Annotated[PriorEntry, _limit_prior(MOST_INERTIA)]
 
 
 class RatioTable(PriorTable):
@@ -136,13 +162,17 @@ class GainTable(StrictModel):
 
 
 GainEntry = Annotated[
-    GainTable, BeforeValidator(_parse_bare_value, json_schema_input_type=GainTable | float)
+    GainTable,
+    BeforeValidator(_parse_bare_value, json_schema_input_type=GainTable | float),
+    _limit_prior(MOST_GAIN),
 ]
 
 
 def _require_increasing(limits: list[float]) -> list[float]:
     if not 0 <= limits[0] < limits[1]:
         raise ValueError(f"a range is [low, high] with 0 <= low < high, not {limits}")
+    if limits[1] > MOST_INERTIA:
+        raise ValueError(f"{limits[1]:g} kg·m² is beyond 0 to {MOST_INERTIA:g}")
     return limits
 
 
@@ -152,10 +182,10 @@ RangeEntry = Annotated[
 
 
 class MeasuredTable(PriorTable):
-    """A quantity known from a measurement or a data sheet, with its standard deviation."""
+    """An inertia known from a measurement or a data sheet, with its standard deviation."""
 
-    value: float = Field(gt=0)
-    std: float = Field(gt=0)
+    value: float = Field(gt=0, le=MOST_INERTIA)
+    std: float = Field(gt=0, le=MOST_INERTIA)
 
     def to_range(self) -> tuple[float, float]:
         """Return the design range: four standard deviations to either side, above zero."""
@@ -195,9 +225,9 @@ class ElementTable(StrictModel):
     derating: float | None = Field(default=None, gt=0, le=1)
     area_m2: float | None = Field(default=None, gt=0)
     radius_m: float | None = Field(default=None, gt=0)
-    P0_bar: PriorEntry
-    peak: float = Field(default=1.0, ge=1)
-    drum_inertia_kgm2: PriorEntry = PriorTable(value=0.0)
+    P0_bar: PressurePrior
+    peak: float = Field(default=1.0, ge=1, le=MOST_PEAK)
+    drum_inertia_kgm2: InertiaPrior = PriorTable(value=0.0)
     i_c: SignedRatioEntry | None = None
     i_out: SignedRatioEntry | None = None
     actuator: Annotated[ActuatorModel, FromTable] | None = None
@@ -255,7 +285,7 @@ class InertiaTable(StrictModel):
 
     J_prime_kgm2: RangeEntry
     J_vehicle_kgm2: InertiaEntry
-    J_out_kgm2: PriorEntry | None = None
+    J_out_kgm2: InertiaPrior | None = None
     J1_kgm2: MeasuredTable | None = None
 
     @property

@@ -21,6 +21,8 @@ from drivetwin.channels.units import BAR
 
 ElementKind = Literal["brake", "clutch"]
 Pair = tuple[float, float]
+MOST_INERTIA = 1e8
+"""Largest inertia of a card [kg m^2]: 40 times that of a haul truck of 600 t on wheels of 2 m."""
 Z95 = 1.959963984540054
 """Half of a 95 % interval of a normal distribution, in standard deviations."""
 
