@@ -83,7 +83,8 @@ def _check(path: Path, total: int, limit: int) -> None:
     if total > limit:
         raise ReaderFailureError(
             f"its variables expand to {total / 1e9:.2f} GB or more, the limit for a file of "
-            f"{path.stat().st_size / 1e6:.2f} MB is {limit / 1e9:.2f} GB",
+            f"{path.stat().st_size / 1e6:.2f} MB is {limit / 1e9:.2f} GB, because the reader "
+            "needs several copies",
             "hand in a shorter log, or only the channels that are needed",
             Where(file=str(path)),
         )
