@@ -95,6 +95,15 @@ test-browser: $(venv)/.dev native ## report and workbench in Chromium; pictures 
 	tools/browser.sh
 	$(bin)/pytest -q -m browser
 
+.PHONY: mutation
+mutation: $(venv)/.dev native ## do tests reject wrong lines? eight modules, 40 mutants each, some hours
+	$(pip) install --quiet --group mutation
+	rm -rf out/covering
+	$(pytest) -p tests.support.covering
+	$(bin)/python -m tools.mutation draw out/mutants.jsonl
+	$(bin)/python -m tools.mutation run out/mutants.jsonl out/mutation.jsonl
+	$(bin)/python -m tools.mutation table out/mutation.jsonl
+
 .PHONY: golden
 golden: $(venv)/.dev native ## compare 72 identifications with stored results (five minutes)
 	$(bin)/python -m tests.golden
