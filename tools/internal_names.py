@@ -55,10 +55,12 @@ def _list_public(tree: Tree, modules: dict[str, str]) -> set[str]:
 
 
 def _list_defined(text: str) -> Iterator[str]:
-    """Yield the names without an underscore that a module defines."""
+    """Yield the names that a module defines or lists in `__all__`."""
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             yield node.name
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            yield from ast.literal_eval(node.value)
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
         yield from (one.id for one in targets if isinstance(one, ast.Name))
 

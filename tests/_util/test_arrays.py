@@ -6,12 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import (
-    FloatArray,
-    compute_median_step,
-    is_time_axis,
-    remember_for_arrays,
-)
+from drivetwin._util.arrays import compute_median_step, is_time_axis, remember_for_arrays
+from tests.support.arrays import FloatArray
 
 
 def test_a_result_is_kept_as_long_as_all_arrays() -> None:

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
 from drivetwin.errors import InputError
+from tests.support.arrays import FloatArray
 
 BAR = 1e5
 QUICK = ActuatorModel(0.0, 1e-3, 1e-3)

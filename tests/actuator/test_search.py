@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.search import Unknowns, sample_posterior
+from tests.support.arrays import FloatArray
 
 RANDOM = np.random.default_rng(3)
 COLUMNS = RANDOM.standard_normal((200, 2)) * [1.0, 0.05]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.bus.drift import Swing
 from drivetwin.bus.recording import Signal
 from drivetwin.bus.torque import balance_held, select_held
+from tests.support.arrays import FloatArray
 
 FRONT, VEHICLE, STIFFNESS, DAMPING = 20.0, 180.0, 18.0 * 4.0e2, 60.0
 """Inertias [kg m^2], stiffness [N m/rad] and damping [N m s/rad] of a shaft: 3.2 Hz."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.calibration.calibrate import Task
@@ -28,6 +27,7 @@ from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.simulation.shift_control import ControlledUnit
+from tests.support.arrays import FloatArray
 from tests.support.upshift.scenario import build_model
 from tests.support.upshift.statement import BAR, make_problem
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Exchange
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective
+from tests.support.arrays import FloatArray
 
 NEEDED = np.array([0.1, 0.2, 0.4, 0.8])
 """Pressure that each of four units needs to hold its lock-up."""

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration import evaluate
 from drivetwin.calibration.calibrate import Task, draw_for
 from drivetwin.calibration.identified_range import simulate_nominal
@@ -34,6 +33,7 @@ from tests.calibration.cases import (
     make_upshift,
 )
 from tests.calibration.twins import ADDED_ELEMENTS, assemble, extend_twin, make_hydraulic_twin
+from tests.support.arrays import FloatArray
 
 
 def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.certificate import LimitCheck
 from drivetwin.calibration.keep_limits import Repair, require_limits
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Objective
 from drivetwin.errors import InfeasibleError, InputError
+from tests.support.arrays import FloatArray
 
 LIMITS = (Limit(Metric.SHIFT_TIME, 0.7), Limit(Metric.FRICTION_ENERGY, 4e4))
 OBJECTIVE = Objective(LIMITS, 0.9, 100.0)

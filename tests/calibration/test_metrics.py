@@ -8,8 +8,8 @@ import pytest
 
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import METRICS, OF_INPUTS, Metric, Outcome, Runs, compute_metrics
-from drivetwin.simulation.dual_clutch import FloatArray
 from tests.calibration.cases import make_downshift, make_upshift
+from tests.support.arrays import FloatArray
 
 UP = make_upshift()
 TIME = UP.time

@@ -15,8 +15,8 @@ from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.knots import build_knot_policy
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import Linear, assemble_program, polish
-from drivetwin.simulation.dual_clutch import FloatArray
 from tests.calibration.cases import SYSTEM, build_profiles, make_draws, make_plant, make_upshift
+from tests.support.arrays import FloatArray
 
 DRAWS = np.linspace(-1.0, 1.0, 20)
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.promise import TYPES, UNITS, compute_promise
 from drivetwin.calibration.scenarios import Scenarios, TwinDraws, draw_types
 from drivetwin.calibration.twin_task import Request, build_task
 from tests.calibration.twins import make_twin
+from tests.support.arrays import FloatArray
 
 TYPE_COUNT, UNIT_COUNT = 3000, 200
 

@@ -11,7 +11,7 @@ import pytest
 from drivetwin._util.progress import attach_listener
 from drivetwin.calibration.search import search_minima
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 
 SETTINGS = CalibrationSettings(
     starts=3, finalists=2, population=10, first_evaluations=100, evaluations=600

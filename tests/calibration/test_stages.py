@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.stages import NO_STAGES, Stage, run_stage
 from tests.calibration.cases import make_plant, make_upshift
+from tests.support.arrays import FloatArray
 
 
 class Store:

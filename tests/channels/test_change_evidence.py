@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.change_evidence import find_change_raster, find_changes, weigh_measured
 from tests.channels.test_update_raster import STEP, hold, wave
+from tests.support.arrays import FloatArray
 
 
 def stamp(count: int) -> FloatArray:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.commands import find_command_step
 from drivetwin.channels.roles import Quantity, make_pressure_role
 from drivetwin.channels.shiftlog import Channel
@@ -19,6 +18,7 @@ from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 from tests.shifts.fixtures import shared
+from tests.support.arrays import FloatArray
 
 MAPPING = """
 [channels.pressure.B2]

@@ -11,12 +11,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.filling import Interpolation, find_filling
 from drivetwin.channels.line_corners import estimate_resolution
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
 from drivetwin.logs.read import read_raw
 from tests.shifts.fixtures import shared
+from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 
 STEP = 1e-3

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.findings import render
 from drivetwin.logs.quality.consistency_checks import mark_late_samples
+from tests.support.arrays import FloatArray
 
 STEP = 1e-3
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from drivetwin.drive import DriveRun
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 
 PERIOD = 0.02
 """Time [s] between messages; speeds are means over it."""

@@ -19,8 +19,9 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.likelihood.effects.effect import WalkStream, draw_walk
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import compute_friction_work
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.simulation.dual_clutch import FloatArray, Trajectory
+from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.vehicle.effects import EffectId
+from tests.support.arrays import FloatArray
 
 SCENARIO = load_scenario("paper_steps")
 MODEL = SCENARIO.model

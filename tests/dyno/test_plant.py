@@ -17,7 +17,8 @@ from drivetwin.errors import ReductionError
 from drivetwin.gearbox import load_gearbox, reduce, solve_gear
 from drivetwin.simulation import driveline_run
 from drivetwin.simulation.driveline import OutputSide
-from drivetwin.simulation.dual_clutch import FloatArray, Signal, Trajectory
+from drivetwin.simulation.dual_clutch import Signal, Trajectory
+from tests.support.arrays import FloatArray
 
 
 def both(scenario: Scenario) -> tuple[Trajectory, Trajectory]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import (
@@ -24,6 +23,7 @@ from drivetwin.estimation.data.shift_data import (
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
+from tests.support.arrays import FloatArray
 
 Input = Callable[[float], float]
 

@@ -15,7 +15,6 @@ import pytest
 from drivetwin.export.subject import Subject, compute_steady_start
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
-    FloatArray,
     RoadLoad,
     ShiftElement,
     Signal,
@@ -25,6 +24,7 @@ from drivetwin.simulation.dual_clutch import (
 from reference.dual_clutch_upshift.problem import DAMPING, FINAL_DRIVE, START, STIFFNESS, WET
 from reference.problem import ROOT, load
 from reference.tables import read
+from tests.support.arrays import FloatArray
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "reference"
 STEP = 1e-3

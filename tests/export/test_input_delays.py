@@ -21,11 +21,12 @@ from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
 from drivetwin.export.modelica.model import format_modelica
 from drivetwin.export.subject import Subject, build_note
 from drivetwin.export.targets import FmiVersion, InputKind
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from tests.export.cases import CASES, STEP, Case
 from tests.export.fmu.test_build import Instance
 from tests.export.modelica.compiled import run as run_modelica
 from tests.export.parameters.sample import twin
+from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 
 OLD_TORQUE = InputDelays(0.0213, 0.0, as_logged=True, held=0.01)

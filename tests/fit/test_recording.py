@@ -10,7 +10,8 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.fit.recording import Measured, Recording, build_network_record
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Signal
+from tests.support.arrays import FloatArray
 
 INPUT_TIME = np.arange(0.5, 4.0, 0.01)
 OUTPUT_TIME = np.arange(0.0, 5.0, 0.01)

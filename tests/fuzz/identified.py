@@ -19,7 +19,6 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.names import ScenarioName
@@ -36,6 +35,7 @@ from drivetwin.vehicle.card import load_card
 from tests.fuzz import harness
 from tests.fuzz.mutate import mutate
 from tests.fuzz.tables import DAMAGING, HARMLESS, TIME, Table
+from tests.support.arrays import FloatArray
 
 SCENARIOS = (ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS, ScenarioName.GEARBOX_CHAIN)
 STEP = 4e-3

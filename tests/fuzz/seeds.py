@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.write import write_log
 from tests.logs.fixtures import UNITS, columns
+from tests.support.arrays import FloatArray
 
 
 def channels() -> list[RawChannel]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.channels.shiftlog import FloatArray
+from tests.support.arrays import FloatArray
 
 TIME = "time"
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.vehicle.card import VehicleCard, load_card
+from tests.support.arrays import FloatArray
 
 CARD = """
 name = "test truck"

@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.roles import NEEDED, Quantity
-from drivetwin.channels.shiftlog import FloatArray, ShiftLog
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import (
     DamagedChannelError,
     FileFormatError,
@@ -28,6 +28,7 @@ from drivetwin.logs.read import read_log, read_raw
 from drivetwin.logs.survey import survey_recording
 from drivetwin.vehicle.card import load_card
 from tests.logs.fixtures import UNITS, card, columns, write
+from tests.support.arrays import FloatArray
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared" / "logs"

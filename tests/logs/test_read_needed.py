@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.roles import FOR_SHIFTS
-from drivetwin.channels.shiftlog import FloatArray, ShiftLog
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.findings import Code, render
 from drivetwin.logs.read import read_log
 from tests.logs.fixtures import UNITS, card, columns, write
+from tests.support.arrays import FloatArray
 
 Table = dict[str, FloatArray]
 

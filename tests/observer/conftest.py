@@ -14,12 +14,13 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.observer.result import FloatArray, Observation
+from drivetwin.observer.result import Observation
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.vehicle_card import VehicleCard
+from tests.support.arrays import FloatArray
 
 
 @dataclass(frozen=True)

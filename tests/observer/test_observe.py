@@ -14,9 +14,10 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import TORQU
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import estimate_torques
-from drivetwin.observer.result import Band, FloatArray
+from drivetwin.observer.result import Band
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from tests.observer.conftest import Bench, brief
+from tests.support.arrays import FloatArray
 
 
 def _without(log: ShiftLog, *roles: str) -> ShiftLog:

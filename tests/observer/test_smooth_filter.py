@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.observer.result import FloatArray
 from drivetwin.observer.smooth import Measurement, Process, filter_forward, smooth_states
+from tests.support.arrays import FloatArray
 
 
 def _process(seed: int, size: int, count: int) -> Process:

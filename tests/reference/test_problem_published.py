@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from drivetwin.simulation.dual_clutch import FloatArray
 from drivetwin.simulation.network import Output
 from reference.problem import load, run
+from tests.support.arrays import FloatArray
 
 PUBLISHED = Path(__file__).resolve().parents[3] / "shared" / "msl"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.identification import Identification
@@ -19,6 +18,7 @@ from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import clip_phases
 from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
 from drivetwin.vehicle.shift_kind import ShiftKind
+from tests.support.arrays import FloatArray
 
 TIME = np.arange(0.0, 3.0, 1e-3)
 STRIBECK = Stribeck(mu_c=0.11, mu_s=0.135, v_s=15.0, mu_v=1e-4)

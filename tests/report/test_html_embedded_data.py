@@ -12,8 +12,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.report.html import NOISE_PARTS, SPAN_PARTS, Store
+from tests.support.arrays import FloatArray
 
 
 def unpacked(store: Store) -> list[FloatArray]:

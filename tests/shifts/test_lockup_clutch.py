@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray, ShiftLog
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import IdentificationError
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.lockup_clutch import (
@@ -23,6 +23,7 @@ from drivetwin.shifts.lockup_clutch import (
 )
 from drivetwin.simulation.added_elements import Converter
 from tests.shifts.fixtures import Plan, make_card
+from tests.support.arrays import FloatArray
 
 TIME = np.arange(0.0, 6.0, 0.02)
 INLET = 120.0 + 5.0 * TIME

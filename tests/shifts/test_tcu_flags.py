@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray, ShiftLog
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.findings import render
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.tcu_flags import find_flag_spans
 from tests.shifts.fixtures import Plan
+from tests.support.arrays import FloatArray
 
 PLAN = Plan(gears=(("2", 1.91), ("3", 1.43)), break_aways=(1.5,))
 TIME = np.arange(0.0, 4.0, 0.01)

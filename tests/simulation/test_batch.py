@@ -24,7 +24,6 @@ from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     DualClutch,
-    FloatArray,
     FrictionTable,
     LossLaw,
     RoadLoad,
@@ -34,6 +33,7 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
+from tests.support.arrays import FloatArray
 
 FRICTION = Stribeck(mu_c=0.12, mu_s=0.145, v_s=6.0, mu_v=1e-4)
 MODEL = DualClutch(

@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.simulation.dual_clutch import FloatArray, Trajectory
+from drivetwin.simulation.dual_clutch import Trajectory
+from tests.support.arrays import FloatArray
 
 SCENARIO = load_scenario("paper_steps")
 MODEL, RATIO = SCENARIO.model, 1.91

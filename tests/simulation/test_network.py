@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import Element, NetworkRun, Output, Sine, Start, simulate
+from tests.support.arrays import FloatArray
 
 SECOND: FloatArray = np.linspace(0.0, 1.0, 101)
 ONE = Signal(np.array([0.0, 1.0]), np.array([1.0, 1.0]))

@@ -11,7 +11,7 @@ import pytest
 from drivetwin.errors import InputError
 from drivetwin.simulation.batch import Keep, simulate_batch, simulate_batch_sensitivities
 from drivetwin.simulation.driveline import build_driveline
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element, Output, Sine, Start, build_element, simulate
 from drivetwin.simulation.network_batch import (
     NetworkScenario,
@@ -22,6 +22,7 @@ from drivetwin.simulation.network_sensitivity import differentiate
 from tests.simulation.test_batch import MODEL, START
 from tests.simulation.test_batch import TIME as SHIFT_TIME
 from tests.simulation.test_batch import scenario as shift_scenario
+from tests.support.arrays import FloatArray
 
 TIME: FloatArray = np.linspace(0.0, 1.0, 1001)
 FRICTION = {"mu_c": 0.11, "mu_s": 0.13, "v_s": 8.0, "mu_v": 1e-4}

@@ -8,9 +8,10 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.estimation.likelihood.noise.residual_covariance import LinearResponse
-from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import NetworkRun, Output, Start, build_element, simulate
 from drivetwin.simulation.network_response import NetworkResponse, compute_response
+from tests.support.arrays import FloatArray
 
 TIME = np.linspace(0.0, 2.0, 201)
 EXACT = Accuracy(exact=True)

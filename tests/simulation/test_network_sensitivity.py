@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import (
     Element,
     NetworkRun,
@@ -28,6 +28,7 @@ from drivetwin.simulation.network_sensitivity import (
     Unknowns,
     differentiate,
 )
+from tests.support.arrays import FloatArray
 from tests.support.random_network import SECONDS, RandomNetwork, draw_plain_network
 
 TIME = np.linspace(0.0, 1.0, 101)

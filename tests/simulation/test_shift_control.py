@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline_run import simulate
@@ -26,6 +25,7 @@ from drivetwin.simulation.shift_control import (
     simulate_network_controlled,
 )
 from tests.calibration.cases import make_slip_policy, make_upshift
+from tests.support.arrays import FloatArray
 
 SHIFT = make_upshift()
 POLICY = make_slip_policy(SHIFT)

@@ -22,8 +22,9 @@ from drivetwin.fit.synthesize import ModelName, SynthesizedLog, read_builtin, sy
 from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.run import ModelRun
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output
+from tests.support.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

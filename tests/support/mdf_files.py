@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.channels.shiftlog import FloatArray
+from tests.support.arrays import FloatArray
 
 Records = NDArray[np.uint8]
 VERSIONS = (b"4.00", b"4.10", b"4.11", b"4.20")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 
 SECONDS = 0.5
 """Length of a run [s]."""

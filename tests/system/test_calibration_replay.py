@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, calibrate
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import METRICS, Metric, Outcome, Runs, compute_metrics
@@ -29,6 +28,7 @@ from tests.calibration.cases import (
     make_plant,
     make_slip_policy,
 )
+from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 from tests.support.upshift.closed_loop import Controlled, Given, Valve, solve_tasks
 from tests.support.upshift.scenario import build_model

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element, NetworkRun, Sine, Start, simulate
+from tests.support.arrays import FloatArray
 
 GRID: FloatArray = np.linspace(0.0, 0.5, 11)
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import GROUND, list_ports
 from drivetwin.simulation.network import Element, NetworkRun, Output, Start, build_element, simulate
+from tests.support.arrays import FloatArray
 from tests.support.random_network import SECONDS, draw_network
 
 GRID: FloatArray = np.linspace(0.0, SECONDS, 101)

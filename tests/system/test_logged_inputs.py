@@ -24,8 +24,9 @@ from drivetwin.export.targets import InputKind
 from drivetwin.files.twin_file import load_twin
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import require_shifts
-from drivetwin.simulation.dual_clutch import FloatArray, State
+from drivetwin.simulation.dual_clutch import State
 from tests.export.modelica import compiled
+from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 
 ROOT = Path(__file__).resolve().parents[2]

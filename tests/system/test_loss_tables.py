@@ -17,8 +17,8 @@ from scipy.integrate import solve_ivp
 from drivetwin.errors import InputError
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.plates import Plates
-from drivetwin.simulation.dual_clutch import FloatArray
 from drivetwin.simulation.network import Output, Sine
+from tests.support.arrays import FloatArray
 
 GEAR = {
     "speed": [20.0, 60.0, 150.0],

@@ -16,8 +16,9 @@ from scipy.linalg import null_space
 from scipy.optimize import LinearConstraint, minimize
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import NetworkRun, Output, Start, simulate
+from tests.support.arrays import FloatArray
 from tests.support.random_network import (
     SECONDS,
     RandomNetwork,

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import NetworkRun, Start, simulate
+from tests.support.arrays import FloatArray
 
 GRID: FloatArray = np.linspace(0.0, 1.0, 11)
 

@@ -14,8 +14,9 @@ import pytest
 from scipy.linalg import expm
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
+from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import Element, NetworkRun, Sine, Start, simulate
+from tests.support.arrays import FloatArray
 
 GRID: FloatArray = np.linspace(0.0, 1.0, 1001)
 TORQUE = Signal(GRID, 10.0 * np.sin(10.0 * math.pi * GRID))

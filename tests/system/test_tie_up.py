@@ -14,8 +14,9 @@ from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox, red
 from drivetwin.gearbox.compare import WholeGearbox, build_whole_gearbox
 from drivetwin.gearbox.maneuver import plan
 from drivetwin.gearbox.network import build_network_elements
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, FloatArray, Signal
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, Signal
 from drivetwin.simulation.network import Element, NetworkRun, Output, Start, simulate
+from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 
 BOXES = [name for name in list_builtin_gearboxes() if not load_gearbox(name).dogs]

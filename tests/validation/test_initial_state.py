@@ -8,7 +8,8 @@ import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.validation.initial_state import find_quiescent_time
-from tests.shifts.fixtures import FloatArray, make_log
+from tests.shifts.fixtures import make_log
+from tests.support.arrays import FloatArray
 
 _TIME = np.arange(0.0, 4.0, 1e-3)
 

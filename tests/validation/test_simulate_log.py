@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError
@@ -33,6 +32,7 @@ from drivetwin.validation.simulate_log import (
 )
 from drivetwin.vehicle.shift_kind import ShiftKind
 from tests.report.sample import identification
+from tests.support.arrays import FloatArray
 
 REFERENCE = Path(__file__).parents[3] / "shared" / "reference"
 CASE = "dual_clutch_upshift"

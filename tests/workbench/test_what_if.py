@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import MissingParameterError
-from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
+from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from drivetwin.validation.simulate_log import simulate_shift
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.what_if import (
@@ -23,6 +23,7 @@ from drivetwin.workbench.what_if import (
     simulate_changes,
     simulate_identified,
 )
+from tests.support.arrays import FloatArray
 
 
 def test_sliders_stand_where_the_log_said(identified: Session) -> None:

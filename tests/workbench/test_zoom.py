@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import NM
 from drivetwin.report.figures.stack import Curve, Panel
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.zoom import collect_curves, parse_view
+from tests.support.arrays import FloatArray
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.shift_data import MeasuredSignal
+from tests.support.arrays import FloatArray
 
 STEP = 12.5
 """Rounding step of an engine torque on a bus [N m]."""

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from drivetwin.channels import shiftlog
-from drivetwin.channels.shiftlog import Channel, FloatArray, ShiftLog
+from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.channels.update_raster import find_updates
 from drivetwin.estimation.data import prepare
 from drivetwin.estimation.result.method import Method
@@ -21,6 +21,7 @@ from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.estimation.asked import record_log
+from tests.support.arrays import FloatArray
 
 REPEATS = 2
 """Rows of the table in which each value is repeated."""

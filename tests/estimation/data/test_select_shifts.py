@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.select_shifts import (
     SHIFT_SELECTION,
@@ -22,6 +22,7 @@ from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
+from tests.support.arrays import FloatArray
 
 CARD: VehicleCard = make_card({"2": 1.91, "3": 1.43})
 J_VEHICLE = 6000.0

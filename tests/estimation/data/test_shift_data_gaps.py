@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from drivetwin.channels.shiftlog import FloatArray, ShiftLog
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.scenario_file import load_scenario
@@ -27,6 +27,7 @@ from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
+from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 from tests.support.shared_results import shared
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
     compute_covariance,
     invert_information,
 )
 from tests.estimation.likelihood.fixtures import fitted
+from tests.support.arrays import FloatArray
 
 FILTER = 0.8
 """Share of a sample that stays until the next: a filter of 4.5 ms at 1 kHz."""

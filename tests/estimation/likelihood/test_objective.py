@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from tests.estimation.likelihood.fixtures import bench, problem
+from tests.support.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.selection.plants import (
     build_plant_priors,
@@ -17,6 +16,7 @@ from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.likelihood.fixtures import bench, problem
+from tests.support.arrays import FloatArray
 
 RIGID = {
     EffectId.INPUT_SHAFT_MODE: 2e4,

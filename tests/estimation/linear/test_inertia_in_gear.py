@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.linear.inertia_in_gear import HeldGear, estimate_gear_inertia
 from drivetwin.estimation.result.estimate import Verdict
+from tests.support.arrays import FloatArray
 from tests.support.coverage import assert_covers, vary_draws
 
 TRUE, LOAD, RATIO, ETA = 64.0, 90.0, 1.406, 0.9

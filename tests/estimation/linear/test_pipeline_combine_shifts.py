@@ -10,9 +10,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.linear.pipeline import IntegralShift, merge_shifts
 from drivetwin.vehicle.spec import PriorValue
+from tests.support.arrays import FloatArray
 
 
 def _shift(

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.linear.resonance import fit_resonance
+from tests.support.arrays import FloatArray
 
 TIME = np.arange(5.0, 8.0, 0.02)
 

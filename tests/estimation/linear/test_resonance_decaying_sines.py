@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.linear.resonance import Windows, compute_misfits, fit_decaying_sines
+from tests.support.arrays import FloatArray
 
 
 def _make(

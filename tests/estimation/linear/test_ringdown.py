@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.linear.ringdown import (
@@ -17,6 +16,7 @@ from drivetwin.estimation.linear.ringdown import (
     remove_jitter,
 )
 from drivetwin.estimation.paper.pipeline import estimate_paper_ringdown
+from tests.support.arrays import FloatArray
 from tests.support.coverage import FULL, assert_covers, vary_draws
 
 TIME = np.arange(0.0, 2.0, 1e-3)

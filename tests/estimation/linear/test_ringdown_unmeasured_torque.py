@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.linear.ringdown import (
     FitResidual,
     compute_forced_response,
@@ -19,6 +18,7 @@ from drivetwin.estimation.linear.ringdown import (
     estimate_variances,
     place_knots,
 )
+from tests.support.arrays import FloatArray
 
 TIME = np.arange(0.0, 1.6, 2e-3)
 RATE, OMEGA = 4.5, 75.0

@@ -12,11 +12,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.gauss_newton import GAUSS_NEWTON, minimise
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
+from tests.support.arrays import FloatArray
 
 NAMES = ("a", "b", "c")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.optimize.objective import (
     find_acting,
     join_columns,
@@ -13,6 +12,7 @@ from drivetwin.estimation.optimize.objective import (
     scale_columns,
     select_columns,
 )
+from tests.support.arrays import FloatArray
 
 
 def make_columns() -> FloatArray:

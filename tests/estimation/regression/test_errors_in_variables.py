@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array, identity
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.regression.errors_in_variables import (
     BandedCholesky,
@@ -17,6 +16,7 @@ from drivetwin.estimation.regression.errors_in_variables import (
     solve,
 )
 from drivetwin.estimation.regression.modulating_functions import Quadrature
+from tests.support.arrays import FloatArray
 from tests.support.coverage import assert_covers, vary_draws
 
 N = 120

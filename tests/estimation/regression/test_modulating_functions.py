@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.regression.modulating_functions import (
     build_hann_kernels,
     build_windows,
     join_windows,
 )
+from tests.support.arrays import FloatArray
 
 
 def uneven(seed: int) -> FloatArray:

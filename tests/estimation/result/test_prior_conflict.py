@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.result.estimate import Estimate, Verdict
@@ -24,6 +23,7 @@ from drivetwin.estimation.result.prior_conflict import (
 from drivetwin.estimation.result.verdict import assess, from_prior
 from drivetwin.findings import Code, render
 from drivetwin.vehicle.spec import PriorValue
+from tests.support.arrays import FloatArray
 
 IDS = ("J_out", "J_prime_2", "Tv_over_if")
 LOG = np.array([1.2, 14.3, 1800.0])

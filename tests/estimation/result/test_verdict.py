@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.linear.estimates import estimate_systematic_std
 from drivetwin.estimation.linear.pipeline import identify_shift
@@ -20,6 +19,7 @@ from drivetwin.estimation.result.verdict import (
 )
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.estimation.synthetic import Run, Truth
+from tests.support.arrays import FloatArray
 
 
 @pytest.mark.parametrize(

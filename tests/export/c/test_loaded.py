@@ -21,7 +21,6 @@ from drivetwin.export.subject import compute_steady_start
 from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
-    FloatArray,
     FrictionTable,
     LossLaw,
     RoadLoad,
@@ -31,6 +30,7 @@ from drivetwin.simulation.dual_clutch import (
     Trajectory,
 )
 from tests.export.cases import CASES, paper_model, paper_subject
+from tests.support.arrays import FloatArray
 
 FLOAT_ERROR = 2e-4
 """Largest deviation of the float model from a reference, of its largest torque: seen are 4e-6 to

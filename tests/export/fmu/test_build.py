@@ -28,8 +28,8 @@ from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
 from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, START
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.export.targets import FmiVersion, InputKind, Platform
-from drivetwin.simulation.dual_clutch import FloatArray
 from tests.export.cases import CASES, STEP, Case, paper_subject
+from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 
 pytestmark = pytest.mark.skipif(

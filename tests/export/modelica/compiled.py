@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import rumoca
 
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 
 _LIBRARY = Path(__file__).with_name("library.mo")
 TOLERANCE = 1e-10

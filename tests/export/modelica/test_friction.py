@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.export.modelica.friction import build_friction_rows
-from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
+from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
+from tests.support.arrays import FloatArray
 
 SLIP = np.linspace(0.0, 500.0, 5001)
 

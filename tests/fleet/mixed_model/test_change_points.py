@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.fleet.mixed_model.change_points import find_steps
-from drivetwin.fleet.mixed_model.mixed import FloatArray, IntArray
+from drivetwin.fleet.mixed_model.mixed import IntArray
+from tests.support.arrays import FloatArray
 
 UNITS, LOGS = 20, 40
 

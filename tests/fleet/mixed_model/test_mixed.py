@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.fleet.mixed_model.mixed import FloatArray, MixedFit, Observations, fit_mixed_model
+from drivetwin.fleet.mixed_model.mixed import MixedFit, Observations, fit_mixed_model
+from tests.support.arrays import FloatArray
 from tests.support.coverage import COARSE, assert_covers, vary_draws
 from tests.support.shared_results import shared
 

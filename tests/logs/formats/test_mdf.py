@@ -18,13 +18,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivetwin.channels.read_options import Column, ReadOptions, TimeColumn
-from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingExtraError
 from drivetwin.logs.formats import mdf
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
+from tests.support.arrays import FloatArray
 
 ROOT = Path(__file__).resolve().parents[3]
 TRUCK_B = ROOT.parent / "shared" / "logs" / "truck_b.mf4"

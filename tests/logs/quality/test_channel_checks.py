@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.roles import get_quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError
 from drivetwin.findings import render
 from drivetwin.logs.quality.channel_checks import check_channel
+from tests.support.arrays import FloatArray
 
 TIME = np.round(np.arange(100) * 0.01, 2)
 RPM = np.pi / 30.0

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.filling import find_filling
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.findings import Code, Finding
 from drivetwin.logs.quality.consistency_checks import replace_filling
+from tests.support.arrays import FloatArray
 
 
 def make_channel(knots: FloatArray) -> Channel:

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.channels.roles import get_quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import DamagedChannelError, TimeError
 from drivetwin.findings import Code
 from drivetwin.logs.quality.channel_checks import check_channel
+from tests.support.arrays import FloatArray
 
 RPM = np.pi / 30.0
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from drivetwin._util.signal_processing import find_true_runs
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import Where
 from drivetwin.findings import Code
 from drivetwin.logs.quality.outliers import (
@@ -25,6 +24,7 @@ from drivetwin.logs.quality.outliers import (
     find_stale,
     find_stuck,
 )
+from tests.support.arrays import FloatArray
 
 TIME = np.arange(0.0, 4.0, 0.002)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.findings import Code
 from drivetwin.logs.quality.time_alignment import (
     check_speed_clocks,
@@ -19,6 +19,7 @@ from drivetwin.logs.quality.time_alignment import (
     estimate_speed_ratio,
 )
 from tests.logs.fixtures import card
+from tests.support.arrays import FloatArray
 
 RATIOS = [1.8, 1.4]
 SEED = 3

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import Channel, FloatArray
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.findings import render
 from drivetwin.logs.quality.time_alignment import check_torque_delays, estimate_torque_delay
+from tests.support.arrays import FloatArray
 
 J_V, I_F, K_O = 6000.0, 5.0, 1.7e5
 STEP = 1e-3

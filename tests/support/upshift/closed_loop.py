@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 from tests.support.upshift.equations import FIRST_MODE, Clutch, Contact, Equations, Mode
 from tests.support.upshift.scipy_solution import _make_event, _make_rate
 from tests.support.upshift.statement import STEP, Inputs, Problem

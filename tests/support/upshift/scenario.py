@@ -13,7 +13,6 @@ from drivetwin.simulation.driveline import SHAFT, build_driveline, build_start
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     DualClutch,
-    FloatArray,
     RoadLoad,
     ShiftElement,
     Signal,
@@ -21,6 +20,7 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.network import Element, Output, Sine, Start
+from tests.support.arrays import FloatArray
 from tests.support.upshift.statement import Inputs, Problem, start
 
 _CLUTCHES = ("2", "3")

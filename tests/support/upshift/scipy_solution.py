@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 from tests.support.upshift.equations import FIRST_MODE, Equations, Guard, Mode
 from tests.support.upshift.statement import SAMPLES, STEP, Solution
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 
 BAR = 1e5
 STEP, SAMPLES = 1e-3, 1501

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_local_cubic, smooth_pressure
 from drivetwin.vehicle.spec import PriorValue
+from tests.support.arrays import FloatArray
 
 P0 = 8e4
 TIME = np.arange(0.0, 1.0, 1e-3)

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.causes import widen_by_rivals
 from drivetwin.estimation.likelihood.effects.correction import Correction, keep_fit
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.result.cause import Cause, Group
 from drivetwin.vehicle.effects import EffectId
 from tests.estimation.likelihood.fixtures import fitted
+from tests.support.arrays import FloatArray
 
 HEAT, LATE = (Group(one, "B3") for one in (EffectId.FRICTION_HEAT, EffectId.PRESSURE_DELAY))
 MOVE = 3.0

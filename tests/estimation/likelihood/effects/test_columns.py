@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import (
     EffectPriors,
     build_columns,
@@ -26,6 +25,7 @@ from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, Signal
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from tests.estimation.likelihood.fixtures import fitted
+from tests.support.arrays import FloatArray
 from tests.support.shared_results import shared
 
 SMALL = 1e-3

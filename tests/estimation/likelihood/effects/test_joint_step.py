@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.effects.joint_step import (
     SIZES,
@@ -21,6 +20,7 @@ from drivetwin.estimation.likelihood.effects.joint_step import (
 )
 from drivetwin.estimation.result.cause import Group
 from drivetwin.vehicle.effects import EffectId
+from tests.support.arrays import FloatArray
 
 DRAG, DRIFT = Group(EffectId.INPUT_DRAG), Group(EffectId.OUTPUT_TORQUE_DRIFT)
 SENSOR = Group(None, "output_torque offset")

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import evaluate_operating_point
 from drivetwin.estimation.likelihood.effects.signals import (
@@ -20,6 +19,7 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import NominalRun
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.effects.test_columns import operating_point
 from tests.estimation.likelihood.fixtures import bench, fitted
+from tests.support.arrays import FloatArray
 
 LAG = 0.03
 LATE = 0.003

@@ -12,7 +12,7 @@ import pytest
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import InputError
-from drivetwin.simulation.dual_clutch import FloatArray
+from tests.support.arrays import FloatArray
 
 SCENARIO = load_scenario("paper_steps")
 

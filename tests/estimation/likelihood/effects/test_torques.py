@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.columns import observe
 from drivetwin.estimation.likelihood.effects.effect import (
     OperatingPoint,
@@ -17,6 +16,7 @@ from drivetwin.estimation.likelihood.effects.effect import (
 )
 from drivetwin.estimation.likelihood.effects.torques import BRAKE_DRAG
 from tests.estimation.likelihood.fixtures import bench, problem
+from tests.support.arrays import FloatArray
 
 STD = 0.01
 MARGIN = 0.02

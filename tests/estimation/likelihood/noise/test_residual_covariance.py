@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.output import Output
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
@@ -18,6 +17,7 @@ from drivetwin.estimation.likelihood.shift_objective import ShiftTerm, weight_by
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
+from tests.support.arrays import FloatArray
 
 
 def _short() -> tuple[ShiftTerm, ParameterVector]:

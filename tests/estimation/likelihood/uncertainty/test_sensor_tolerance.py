@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.effects.correction import keep_fit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import build_friction_curves
@@ -20,6 +19,7 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
 from drivetwin.estimation.linear.estimates import apply_sensor_error
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
+from tests.support.arrays import FloatArray
 from tests.support.shared_results import shared
 
 DELAY = 1e-3
