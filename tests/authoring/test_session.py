@@ -262,3 +262,38 @@ def test_a_gain_is_assumed_from_what_the_log_shows() -> None:
     assert own.value == pytest.approx((0.003 * 0.0048) ** 0.5 / 0.12)
     assert (own.std, other.std) == pytest.approx((0.2 * own.value, 0.4 * own.value))
     assert other.value == pytest.approx(own.value)
+
+
+def test_unknown_and_skip_take_what_the_estimator_assumes(tmp_path: Path) -> None:
+    """They are refused where nothing is assumed, and the question is asked again."""
+    refused = set()
+
+    def ask(question: Question, reason: str) -> str:
+        word = ("unknown", "skip")[len(question.key) % 2]
+        if reason:
+            refused.add(question.key[-1])
+        return answer_valid(question) if reason else word
+
+    session = make_session()
+    session.ask_all(ask)
+    card = load(format_card(session.answers), tmp_path)
+    for element in card.elements.values():
+        assert element.gain.assumed
+        assert (element.P0.value, element.P0.std) == pytest.approx((0.8e5, 0.4e5))
+    assert not {"P0_bar", "form", "J_out", "names", "name"} & refused
+    assert {"ratios", "final_drive", "J_prime", "mass"} <= refused
+
+
+def test_back_returns_to_the_question_before() -> None:
+    asked: list[str] = []
+
+    def ask(question: Question, _: str) -> str:
+        asked.append(question.key[-1])
+        if len(asked) == 1 or (asked[-1] == "names" and asked.count("names") == 1):
+            return "back"
+        return answer_valid(question)
+
+    session = make_session()
+    session.ask_all(ask)
+    assert asked[:7] == ["name", "name", "gearbox", "ratios", "names", "ratios", "names"]
+    assert not session.list_open()

@@ -167,6 +167,18 @@ def test_questions_in_a_terminal_lead_to_a_card(tmp_path: Path) -> None:
     assert card.sensors["output_torque"].gain > 0.0
 
 
+def test_a_gain_far_from_the_guess_of_the_log_is_remarked(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The log gives μ·gain; half of the gain doubles μ."""
+    for gain, is_far in (("0.027", False), ("0.0135", True)):
+        out = tmp_path / f"{gain}.toml"
+        options = [*COMPLETE[:-1], f"B3:gain_m3={gain}"]
+        assert main(["card", "new", "-o", str(out), "--from", str(bench_files.log), *options]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert ("product of μ and gain" in said) is is_far, said
+
+
 @pytest.mark.parametrize(("key", "code"), [(b"\x04", 2), (INTERRUPT, 130)])
 def test_a_session_that_ends_early_writes_nothing(tmp_path: Path, key: bytes, code: int) -> None:
     answers = [("Name of the vehicle", b"truck\n"), ("Built-in gearbox", key)]

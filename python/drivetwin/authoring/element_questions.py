@@ -20,11 +20,12 @@ from drivetwin.authoring.answers import (
     list_gears,
 )
 from drivetwin.authoring.derive import GEOMETRY
-from drivetwin.authoring.log_estimates import ASSUMED_FRICTION, LogEstimates
+from drivetwin.authoring.log_estimates import ASSUMED_FRICTION, USUAL_FILL, LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.parsing import Parser, parse_choice, parse_number, split_list
 from drivetwin.authoring.question import Question, make_parser, make_question
 from drivetwin.authoring.stated_number import StatedNumber, parse_clutch_ratio
+from drivetwin.channels.units import BAR
 from drivetwin.vehicle.card import RATIO_TOLERANCE
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.converter import ConverterTable
@@ -68,6 +69,11 @@ def _make_table(points: tuple[tuple[float, float, float], ...]) -> dict[str, lis
     return {entry: [point[k] for point in points] for k, entry in enumerate(_ENTRIES)}
 
 
+_ASSUMED_FILL = Answer(
+    StatedNumber.make(f"{USUAL_FILL.value / BAR:g}", f"{USUAL_FILL.std / BAR:g}"),
+    Origin.DEFAULT,
+    "assumed: usual range of a wet clutch or brake",
+)
 _KIND_LETTERS = {"B": "brake", "K": "clutch"}
 """Kinds by the usual first letter of an element's name."""
 
@@ -147,7 +153,7 @@ def _make_fill_question(
     if found is not None and survey is not None:
         note = f"pressure at which the output torque of {survey.name} begins to fall"
         guess = Answer(found, Origin.GUESS, note)
-    return _make_question(element, "P0_bar", default=guess)
+    return _make_question(element, "P0_bar", default=guess, assumed=_ASSUMED_FILL)
 
 
 def _iterate_gain_questions(
@@ -157,9 +163,9 @@ def _iterate_gain_questions(
     hint = f" Of {element} {describe_product(product.low, product.high)}." if product else ""
     form = find_form(answers, element)
     if form is None:
-        yield _make_question(element, "form", hint=hint)
+        yield _make_question(element, "form", hint=hint, assumed=Answer(GainForm.UNKNOWN.value))
     elif form is GainForm.GAIN:
-        yield _make_question(element, "gain_m3", hint=hint)
+        yield _make_question(element, "gain_m3", hint=hint, assumed=Answer(GainForm.UNKNOWN))
     elif form is not GainForm.UNKNOWN:
         yield _make_question(element, "surfaces")
         yield _make_question(element, "derating")

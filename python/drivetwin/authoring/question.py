@@ -25,6 +25,11 @@ from drivetwin.authoring.stated_number import (
 )
 from drivetwin.vehicle.card_fields import CardField, get_card_field
 
+UNDECIDED = ("unknown", "skip")
+"""Answers of a user who does not know a value."""
+BACK = "back"
+"""Answer that leads to the question before."""
+
 
 @dataclass(frozen=True)
 class Question:
@@ -33,8 +38,9 @@ class Question:
     `option` is the command-line option that replaces it, `prompt` names the quantity and `meaning`
     explains it in a sentence. `parse` converts the text of an answer and raises ValueError with the
     reason where it cannot. `default` is taken for an empty answer; without one an answer is
-    required. `shown` replaces the text of the default. `choices` are the possible
-    answers; empty where any text is one.
+    required. `assumed` is the answer that lets the estimator assume a value; it is taken for
+    `unknown` and `skip`, else the default is. `shown` replaces the text of the default. `choices`
+    are the possible answers; empty where any text is one.
     """
 
     key: Key
@@ -44,6 +50,7 @@ class Question:
     parse: Parser
     unit: str = ""
     default: Answer | None = None
+    assumed: Answer | None = None
     shown: str = ""
     choices: tuple[str, ...] = ()
 
@@ -55,7 +62,15 @@ class Question:
         return format_value(self.default.value, separator)
 
     def answer(self, text: str) -> Answer:
-        """Return the answer for a text; ValueError states why the text is refused."""
+        """Return the answer for a text; ValueError states why the text is refused.
+
+        A guess from a log that is taken for `unknown` or `skip` is not confirmed.
+        """
+        if text.strip().casefold() in UNDECIDED:
+            known = self.default or self.assumed
+            if known is None:
+                raise ValueError("nothing is assumed for this entry; a value is needed")
+            return known
         if not text.strip():
             if self.default is None:
                 raise ValueError("an answer is needed here")
@@ -97,8 +112,8 @@ def make_question(
     element : str
         Name of the shift element that the question is about; empty where it has none yet.
     **details : Any
-        `default`, `shown` and `choices` of the question; all others are words for the braces in
-        the texts of the field.
+        `default`, `assumed`, `shown` and `choices` of the question; all others are words for the
+        braces in the texts of the field.
 
     Returns
     -------
@@ -106,7 +121,8 @@ def make_question(
         The question.
     """
     field = get_card_field(*key)
-    own = {name: details.pop(name) for name in ("default", "shown", "choices") if name in details}
+    parts = ("default", "assumed", "shown", "choices")
+    own = {name: details.pop(name) for name in parts if name in details}
     words = {"name": element or "NAME", "element": element or "the element", **details}
     option, prompt, meaning = (
         text.format_map(words) for text in (field.option, field.prompt, field.meaning)

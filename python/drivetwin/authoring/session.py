@@ -9,7 +9,7 @@ from dataclasses import replace
 from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, get_value, list_gears
 from drivetwin.authoring.derive import derive_answers
 from drivetwin.authoring.log_estimates import LogEstimates, estimate_entries
-from drivetwin.authoring.question import FormEntry, Question
+from drivetwin.authoring.question import BACK, FormEntry, Question
 from drivetwin.authoring.questions import (
     Sources,
     find_next,
@@ -59,14 +59,26 @@ class Session:
         return [one for one in open_ if one.key in known]
 
     def ask_all(self, ask: Ask) -> None:
-        """Ask every question that is open; one whose answer is refused is asked again."""
+        """Ask every question that is open; one whose answer is refused is asked again.
+
+        `back` withdraws the last answer and asks its question again.
+        """
+        asked: list[Key] = []
+        reason = ""
         while (question := self._find_next()) is not None:
+            text = ask(question, reason)
             reason = ""
-            while question.key not in self._stated:
-                try:
-                    self._stated[question.key] = question.answer(ask(question, reason))
-                except ValueError as fault:
-                    reason = str(fault)
+            if text.strip().casefold() == BACK:
+                if asked:
+                    del self._stated[asked.pop()]
+                else:
+                    reason = "this is the first question"
+                continue
+            try:
+                self._stated[question.key] = question.answer(text)
+                asked.append(question.key)
+            except ValueError as fault:
+                reason = str(fault)
 
     def fill_defaults(self) -> None:
         """Take the default of every open question.

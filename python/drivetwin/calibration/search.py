@@ -40,7 +40,7 @@ def search_minima(
 
     Raises MissingExtraError without the library `cma`.
     """
-    cma = import_extra("cma", "calibrate", "the search of a calibration", Path("calibrate"))
+    cma = require_search()
     searches = [
         _start_search(cma, start, settings, seed + number) for number in range(settings.starts)
     ]
@@ -52,6 +52,11 @@ def search_minima(
     _advance(finalists, evaluate, settings.evaluations, (done, total))
     found = [Candidate(np.asarray(one.best.x), float(one.best.f)) for one in finalists]
     return sorted(found, key=lambda one: one.value)
+
+
+def require_search() -> Any:
+    """Return the library of the search. Raises MissingExtraError without it."""
+    return import_extra("cma", "calibrate", "the search of a calibration", Path("calibrate"))
 
 
 def _start_search(cma: Any, start: FloatArray, settings: CalibrationSettings, seed: int) -> Any:

@@ -16,7 +16,7 @@ from drivetwin.cli.output import (
     print_paragraph,
     show_step,
 )
-from drivetwin.errors import InputError, Where
+from drivetwin.errors import DrivetwinError, InputError, Where
 from drivetwin.vehicle.card_fields import list_single_options
 
 if TYPE_CHECKING:
@@ -106,7 +106,11 @@ def new(request: NewCard, *, as_json: bool) -> None:
     if is_draft:
         session.fill_draft()
     elif can_ask:
-        print_line("Each question has a sentence on its number; Enter takes the [default].")
+        print_paragraph(
+            "Each question has a sentence on its number. Enter takes the [default]; 'unknown' or "
+            "'skip' takes the value that the estimator assumes; 'back' returns to the question "
+            "before."
+        )
         session.ask_all(_ask)
     else:
         session.fill_defaults()
@@ -115,7 +119,7 @@ def new(request: NewCard, *, as_json: bool) -> None:
         refuse_faults(text, str(output))
     _refuse_existing(output, force=request.force)
     write_text(output, text)
-    findings = () if session.list_open() else _check(output)
+    findings = () if session.list_open() else _check(output, session, survey)
     if as_json:
         open_ = {question.option: question.prompt for question in session.list_open()}
         print_json({"card": output, "open": open_, "findings": dump_findings(findings)})
@@ -177,12 +181,21 @@ def _ask(question: Question, reason: str) -> str:
         ) from None
 
 
-def _check(output: Path) -> tuple[Finding, ...]:
-    """Return what is implausible on a complete card."""
+def _check(output: Path, session: Session, survey: LogSurvey | None) -> tuple[Finding, ...]:
+    """Return what is implausible on a complete card, also against the log that it is from."""
+    from drivetwin.authoring.log_estimates import name_pressures
     from drivetwin.plausibility.check import check_card
+    from drivetwin.shifts.detect import detect_shifts
     from drivetwin.vehicle.card import load_card
 
-    return check_card(load_card(output))
+    card = load_card(output)
+    if survey is None:
+        return check_card(card)
+    log = name_pressures(survey.log, session.answers)
+    try:
+        return check_card(card, log, detect_shifts(log, card).shifts)
+    except DrivetwinError:  # `card check` states why the log cannot be compared
+        return check_card(card)
 
 
 def _report(

@@ -56,6 +56,8 @@ class Slider:
     low: float
     high: float
     step: float
+    half_width: float | None = None
+    """Half of the 95 % interval of the identified value; None without one."""
 
     @classmethod
     def from_range(
@@ -139,8 +141,14 @@ def plot_what_if(identified: Validation, present: Validation) -> Figure:
 
 
 def build_what_if_panels(identified: Validation, present: Validation) -> list[Panel]:
-    """Return the panels of `plot_what_if` from top to bottom."""
-    return [_add_identified(panel, identified) for panel in build_validation_panels(present)]
+    """Return the panels of `plot_what_if` from top to bottom: moved outputs, then inputs."""
+    panels = sorted(build_validation_panels(present), key=lambda panel: not _follows(panel))
+    return [_add_identified(panel, identified) for panel in panels]
+
+
+def _follows(panel: Panel) -> bool:
+    """Return True if a curve of the panel follows the sliders."""
+    return any(curve.name in _FOLLOWING for curve in panel.curves)
 
 
 def collect_changed_curves(
@@ -172,7 +180,11 @@ def _build_slider(twin: Twin, name: str) -> Slider | None:
         span = _DELAY_SPAN
     low, high = max(value - span, spec.lower), min(value + span, spec.upper)
     shown = (low * display.factor, value * display.factor, high * display.factor)
-    return Slider.from_range(name, get_parameter_name(name), display.label, shown)
+    slider = Slider.from_range(name, get_parameter_name(name), display.label, shown)
+    interval = estimate.ci95_total
+    if interval is None:
+        return slider
+    return replace(slider, half_width=0.5 * (interval[1] - interval[0]) * display.factor)
 
 
 def _replace_values(twin: Twin, changes: Mapping[str, float]) -> Twin:

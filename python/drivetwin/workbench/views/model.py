@@ -180,13 +180,13 @@ def _build_bench(session: Session, live: Live) -> list[Component]:
                 html.Div([_build_slider(one, work) for one in sliders], className="sliders"),
                 html.Div(
                     [
-                        html.Div(_build_fit(live, ""), id="model-fit"),
                         ui.make_graph(
                             "model-plot",
                             "Simulation over measurement",
                             live.figure,
                             cursors=True,
                         ),
+                        html.Div(_build_fit(live, ""), id="model-fit"),
                     ]
                 ),
             ],
@@ -206,7 +206,10 @@ def _build_slider(one: Slider, work: SessionState) -> Component:
     limits = {"min": one.low, "max": one.high, "step": one.step, "value": value}
     return html.Div(
         [
-            html.Div([html.Span(one.label, className="name"), *lock], className="top"),
+            html.Div(
+                [html.Span([html.B(one.label), f" {_format_identified(one)}"]), *lock],
+                className="top",
+            ),
             html.Div(
                 [
                     html.Small(f"{one.low:g}"),
@@ -233,6 +236,13 @@ def _build_slider(one: Slider, work: SessionState) -> Component:
         ],
         className="slider",
     )
+
+
+def _format_identified(one: Slider) -> str:
+    """Format the identified value with its 95 % interval; empty without one."""
+    if one.half_width is None:
+        return ""
+    return f"{one.value:.4g} ± {one.half_width:.2g} {one.unit}"
 
 
 def _explain(fault: DrivetwinError) -> str:
