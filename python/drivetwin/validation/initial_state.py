@@ -106,7 +106,8 @@ def _is_recorded(log: ShiftLog, role: str, time: float) -> bool:
 
 
 def _fit_local(channel: Channel, time: float) -> _Local:
-    """Polynomial fit over the first moments from `time`; at least two samples are taken."""
+    """Polynomial fit over the first fresh samples from `time`; at least two are taken."""
+    channel = channel.updates
     first = int(np.searchsorted(channel.time, time - 1e-9))
     count = max(2, int(np.searchsorted(channel.time, time + _SPAN) - first))
     t = channel.time[first : first + count] - time

@@ -203,10 +203,12 @@ def _select_window(log: ShiftLog, shift: Shift) -> tuple[float, float]:
 
 
 def _delay(channel: Channel, delay: float) -> Signal:
-    """Samples later by `delay` [s]; the first and the last one reach to the ends of the channel."""
-    time = channel.time + delay
+    """Fresh samples later by `delay` [s]; the first and the last one reach to the ends of the
+    channel."""
+    fresh = channel.updates
+    time = fresh.time + delay
     time[0], time[-1] = min(time[0], channel.time[0]), max(time[-1], channel.time[-1])
-    return Signal(time, channel.values)
+    return Signal(time, fresh.values)
 
 
 def _apply_delay(channel: Channel, shift: float) -> Signal:
@@ -234,13 +236,14 @@ def compute_run_signals(model: DualClutch, run: Trajectory) -> dict[str, FloatAr
 def _build_traces(
     model: DualClutch, log: ShiftLog, run: Trajectory, names: Sequence[str] = SIGNALS
 ) -> dict[str, SignalTrace]:
-    """Pair simulated signals with the measurement; without a channel there is no trace."""
+    """Pair simulated signals with the fresh samples of the measurement, which repeated rows would
+    make late; without a channel there is no trace."""
     simulated = compute_run_signals(model, run)
     traces = {}
     for name in names:
         if name not in log:
             continue
-        channel = log[name]
+        channel = log[name].updates
         inside = (channel.time >= run.time[0]) & (channel.time <= run.time[-1])
         time = channel.time[inside]
         traces[name] = SignalTrace(
