@@ -29,7 +29,7 @@ VALID = {
     "elements": "B2 B3", "kind": "clutch", "i_c": "1", "i_out": "", "P0_bar": "0.8", "form": "gain",
     "gain_m3": "0.03", "surfaces": "10", "derating": "0.9", "area_m2": "0.02", "radius_m": "0.15",
     "outer_mm": "340", "inner_mm": "0", "piston_outer_mm": "300", "piston_inner_mm": "0",
-    "i_in": "1", "final_drive": "4.88", "J_prime": "4..20", "mass": "12000", "radius": "0.5",
+    "i_in": "1", "final_drive": "4.88", "J_prime": "4..20", "mass": "12000", "wheel_radius": "0.5",
     "J_out": "", "converter": "none",
 }  # fmt: skip
 """An answer to each question that is taken in nearly all situations, by the end of its key."""
@@ -172,6 +172,7 @@ def test_options_leave_nothing_open(tmp_path: Path) -> None:
     assert card.elements["C3"].i_c is not None
     assert card.elements["C3"].i_c.value == pytest.approx(0.41, rel=1e-4)
     assert card.elements["C3"].P0.std == pytest.approx(1e4)
+    assert card.wheel_radius == PriorValue(0.5, 0.01)
     assert card.sensors["engine_torque"].gain == pytest.approx(0.07 / 3**0.5, rel=1e-2)
     assert card.sensors["pressure.C3"].offset == pytest.approx(0.4e5 / 3**0.5, rel=1e-2)
 

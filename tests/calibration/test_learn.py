@@ -15,11 +15,14 @@ from drivetwin.calibration.learn import Correction, correct_twin
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.vehicle_unknowns import METHOD, build_unknowns
 from drivetwin.estimation.likelihood.parametrization import LAW
+from drivetwin.estimation.result.estimate import Z95
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
+from drivetwin.twin.friction_law import compute_friction_std
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
 from drivetwin.validation.simulate_log import LoggedShift
+from drivetwin.vehicle.spec import PriorValue
 from tests.calibration.bench import write_bench_log
 from tests.calibration.twins import ADDED_ELEMENTS, STD, extend_twin, make_twin
 
@@ -176,3 +179,21 @@ def test_the_part_of_the_vehicle_is_corrected_too(twin: Twin, tmp_path: Path) ->
     assert frequency.std_total < 0.9 * STD * ADDED_ELEMENTS["input shaft"]["mode_frequency"]
     assert abs(frequency.value - true) < 3.0 * frequency.std_total
     assert found.after["output_torque"] < 1.3 * 15.0
+
+
+def test_a_correction_moves_friction_times_gain_and_keeps_the_spread_of_the_gain() -> None:
+    plain = make_twin()
+    gain = PriorValue(plain.elements["B3"].gain, 0.1 * plain.elements["B3"].gain)
+    rough = replace(
+        plain,
+        friction={name: one.add_gain_spread(gain) for name, one in plain.friction.items()},
+    )
+    shift = build_nominal_shift(plain, ("2", "3"))
+    exact, wide = (build_unknowns(one, shift, Spread()) for one in (plain, rough))
+    np.testing.assert_allclose(wide.root @ wide.root.T, exact.root @ exact.root.T, rtol=1e-9)
+    z, covariance = np.zeros(wide.count), np.eye(wide.count)
+    curves = [one.build_twin(z, covariance).friction["B3"] for one in (exact, wide)]
+    products = [compute_friction_std(one) for one in curves]
+    assert products[1] == pytest.approx(products[0])
+    half = [0.5 * (one.mu_hi - one.mu_lo) / (Z95 * one.mu) for one in curves]
+    np.testing.assert_allclose(half[1], np.hypot(half[0], 0.1))

@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin.calibration.calibrate import draw_for
 from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.options import USUAL_WHEEL_RADIUS
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.slip import SlipPolicy
 from drivetwin.calibration.scenarios import Purpose
@@ -36,6 +37,16 @@ def test_operating_point_and_limits_come_from_the_twin() -> None:
         Metric.VIBRATION_DOSE,
         Metric.FRICTION_ENERGY,
     ]
+
+
+def test_the_wheel_radius_is_that_of_the_request_then_that_of_the_twin() -> None:
+    car = replace(make_twin(), wheel_radius=0.31)
+    for twin, request, radius in (
+        (car, REQUEST, 0.31),
+        (car, replace(REQUEST, wheel_radius=0.3), 0.3),
+        (make_twin(), REQUEST, USUAL_WHEEL_RADIUS),
+    ):
+        assert build_task(twin, replace(request, limits=())).maneuver.wheel_radius == radius
 
 
 def test_draws_have_the_covariance_of_the_twin() -> None:

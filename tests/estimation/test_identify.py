@@ -17,7 +17,8 @@ from drivetwin.estimation.data.prepare import build_driveline
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import ACCELERATION_ERROR, ALL_BEFORE_LOSS, COMMON_GAIN
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.estimates import WITH_ETA, build_estimates
+from drivetwin.estimation.likelihood.estimates import build_estimates
+from drivetwin.estimation.likelihood.uncertainty.torque_scale import WITH_ETA
 from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.result.estimate import Verdict
@@ -284,6 +285,42 @@ def test_without_an_output_torque_ratios_are_told_and_absolute_values_refused() 
     assert found.estimates["eta"].verdict is Verdict.NOT_IDENTIFIABLE
     assert found.friction["B3"].method_text == "likelihood, μ over η"
     _check_efficiency_from_design(found, card)
+    _check_scale_from_mass(found, card)
+
+
+def _check_scale_from_mass(found: Identification, card: VehicleCard) -> None:
+    """A stated J_vehicle sets the scale: it keeps its deviation, and all others get it."""
+    over_eta = found.estimates["J_vehicle_over_eta"].value
+    assert over_eta is not None
+    mass = PriorValue(0.9 * over_eta, 0.018 * over_eta)
+    known = replace(card, known={"J_vehicle": mass})
+    fit, signals = get_likelihood_fit(found)
+    none = EffectPriors({effect: EffectPrior(0.0) for effect in EffectId})
+    drivelines = [build_driveline(known, found.shifts[0])]
+    result = build_estimates(fit, signals, drivelines, {}, none)
+    told = result.estimates
+    ratio, stiffness = (told[f"{one}_over_eta"].value for one in ("J_vehicle", "k_o"))
+    assert ratio is not None
+    assert stiffness is not None
+    eta = told["eta"]
+    assert eta.value == pytest.approx(mass.value / ratio)
+    assert eta.verdict is Verdict.IDENTIFIED
+    own = (told["J_vehicle_over_eta"].std_total or 0.0) / ratio
+    assert eta.std_total == pytest.approx(mass.value / ratio * np.hypot(0.02, own))
+    assert told["J_vehicle"].value == pytest.approx(mass.value)
+    assert told["J_vehicle"].std_total == pytest.approx(mass.std)
+    assert told["J_vehicle"].verdict is Verdict.DESIGN
+    assert told["k_o"].value == pytest.approx(mass.value / ratio * stiffness)
+    assert result.joint is not None
+    place = [result.joint.ids.index(one) for one in ("eta", "k_o", "J_vehicle")]
+    std = np.sqrt(np.diag(result.joint.covariance))[place]
+    assert std == pytest.approx([told[result.joint.ids[k]].std_total for k in place])
+    correlation = result.joint.covariance[np.ix_(place, place)] / np.outer(std, std)
+    assert correlation.min() > 0.9
+    wrong = replace(card, known={"J_vehicle": PriorValue(2.0 * over_eta, 0.02 * over_eta)})
+    again = build_estimates(fit, signals, [build_driveline(wrong, found.shifts[0])], {}, none)
+    assert again.estimates["eta"].value is None
+    assert Code.CARD_CONTRADICTED in [one.code for one in again.findings]
 
 
 def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> None:

@@ -25,7 +25,7 @@ OLDER = Path(__file__).parents[1] / "golden" / "older"
 def test_an_older_card_has_the_distributions_of_its_digits() -> None:
     card = load_card(OLDER / "vehicle.toml")
     assert card.final_drive.std > 0.0
-    assert card.elements["B3"].gain == PriorValue(0.027)
+    assert card.elements["B3"].gain == PriorValue(0.027, 0.05 * 0.027)
 
 
 def test_an_older_result_is_explained_with_all_its_findings() -> None:

@@ -14,7 +14,7 @@ from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.distribution import describe_model
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
+from drivetwin.vehicle.spec import PARTNER_LEVEL_STD, PriorValue
 from tests.report.sample import SHIFT, STRIBECK, card, identification
 
 IDS = ("eta", "P0.B3")
@@ -52,8 +52,25 @@ def draw_laws(twin: Twin, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def test_an_element_without_a_law_has_that_of_its_partner_with_a_level_of_its_own() -> None:
-    _, _, partner = draw_laws(build_twin(identification(), card()), 600)
+    twin = build_twin(identification(), card())
+    _, _, partner = draw_laws(twin, 600)
     assert partner.std() / partner.mean() == pytest.approx(PARTNER_LEVEL_STD, rel=0.15)
+    rough = {name: replace(one, gain_std=0.1 * one.gain) for name, one in twin.elements.items()}
+    _, _, partner = draw_laws(replace(twin, elements=rough), 600)
+    both = np.sqrt(PARTNER_LEVEL_STD**2 + 2.0 * 0.1**2)
+    assert partner.std() / partner.mean() == pytest.approx(both, rel=0.15)
+
+
+def test_a_drawn_friction_has_no_spread_of_the_gain() -> None:
+    found = identification()
+    rough = {name: one.add_gain_spread(PriorValue(0.03, 0.003)) for name, one in
+             found.friction.items()}  # fmt: skip
+    exact, wide = (
+        describe_model(build_twin(replace(found, friction=one), card()), SHIFT, IDS)
+        for one in (found.friction, rough)
+    )
+    assert wide.scales == pytest.approx(exact.scales)
+    np.testing.assert_array_equal(wide.covariance, exact.covariance)
 
 
 def test_friction_is_drawn_with_what_it_is_correlated_with() -> None:

@@ -149,6 +149,21 @@ def test_true_parameters_follow_the_reference(twin: Twin, log: ShiftLog, shift: 
     assert locked[-1] == pytest.approx(shift.lockup_time, abs=2e-4)
 
 
+def test_repeated_rows_of_a_slow_signal_are_no_samples(
+    twin: Twin, log: ShiftLog, shift: Shift
+) -> None:
+    rows = 10 * (np.arange(log["input_speed"].time.size) // 10)
+    slow = {
+        role: replace(log[role], values=log[role].values[rows], held=True)
+        for role in ("input_speed", "output_speed")
+    }
+    repeated = simulate_shift(twin, replace(log, channels={**log.channels, **slow}), shift)
+    for signal in slow:
+        trace = repeated.traces[signal]
+        assert trace.time.size == np.unique(rows[: log[signal].time.size]).size
+        np.testing.assert_allclose(trace.simulated, trace.measured, rtol=2e-3)
+
+
 def test_a_wrong_parameter_shows(twin: Twin, log: ShiftLog, shift: Shift) -> None:
     softer = twin.build_dual_clutch(shift, overrides={"k_o": 1.6e5})
     good, bad = simulate_shift(twin, log, shift), simulate_shift(twin, log, shift, softer)

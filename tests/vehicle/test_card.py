@@ -13,6 +13,7 @@ from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import PriorValue, SensorTolerance, VehicleCard, load_card
+from drivetwin.vehicle.ratio_card import load_ratio_card
 from tests.logs.fixtures import CARD
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "vehicles"
@@ -47,13 +48,27 @@ def test_values_are_si_and_defaults_stand(tmp_path: Path) -> None:
     assert card.inputs == {"card.toml": hashlib.sha256(content).hexdigest()}
     element = card.elements["B2"]
     assert (element.P0.value, element.P0.std) == (0.8e5, 0.1e5)
-    assert (element.gain, element.peak, element.drum_inertia) == (
-        PriorValue(0.03),
-        1.0,
-        PriorValue(0.0),
-    )
+    assert (element.peak, element.drum_inertia) == (1.0, PriorValue(0.0))
     assert card.sensors == {}
     assert card.channels == {}
+
+
+@pytest.mark.parametrize(
+    ("entry", "std"),
+    [
+        ("gain_m3 = 0.03", 0.0015),
+        ("surfaces = 10, derating = 0.8, area_m2 = 0.025, radius_m = 0.15", 0.0015),
+        ("gain_m3 = { value = 0.03 }", 0.0015),
+        ("gain_m3 = { value = 0.03, std = 0.001 }", 0.001),
+        ("gain_m3 = { value = 0.03, std = 0.0 }", 0.0),
+    ],
+)
+def test_a_gain_is_known_to_5_percent_unless_the_card_says_otherwise(
+    tmp_path: Path, entry: str, std: float
+) -> None:
+    gain = load(tmp_path, changed("gain_m3 = 0.03", entry)).elements["B2"].gain
+    assert gain.value == pytest.approx(0.03)
+    assert gain.std == pytest.approx(std)
 
 
 def test_measured_inertias_and_efficiencies_are_priors(tmp_path: Path) -> None:
@@ -267,3 +282,19 @@ def test_the_rotating_clutch_of_truck_b_has_the_ratios_of_its_planetary_set() ->
     i_c, i_out = load_card(EXAMPLES / "truck_b.toml").get_clutch_ratios("K2")
     assert i_c == pytest.approx(z3 / (1 + z3), rel=1e-12)
     assert i_out == pytest.approx((1 + z3) / z3, rel=1e-12)
+
+
+def test_the_wheel_radius_is_known_to_2_percent_and_optional(tmp_path: Path) -> None:
+    assert load(tmp_path, CARD).wheel_radius is None
+    bare = load(tmp_path, f"wheel_radius_m = 0.31\n{CARD}").wheel_radius
+    assert bare == PriorValue(0.31, 0.02 * 0.31)
+    stated = load(tmp_path, "wheel_radius_m = { value = 0.31, std = 0.002 }\n" + CARD)
+    assert stated.wheel_radius == PriorValue(0.31, 0.002)
+    assert load_ratio_card(tmp_path / "card.toml").wheel_radius == 0.31
+    assert "wheel_radius_m" in refusal(tmp_path, f"wheel_radius_m = 31\n{CARD}")
+
+
+def test_the_inertia_of_the_vehicle_is_the_stated_one(tmp_path: Path) -> None:
+    assert load(tmp_path, CARD).nominal_vehicle_inertia == pytest.approx((2500.0 * 6500.0) ** 0.5)
+    text = changed("J_vehicle_kgm2 = [2500, 6500]", "J_vehicle_kgm2 = { value = 4e3, std = 1e3 }")
+    assert load(tmp_path, text).nominal_vehicle_inertia == 4000.0

@@ -92,6 +92,8 @@ def _format_head(answers: Answers, survey: LogSurvey | None, *, draft: bool) -> 
     yield 'loss_law = "paper"  # or "dissipative": how gears lose power when torque reverses'
     yield from _format_field({("i_in",): Answer(1.0, Origin.DEFAULT), **answers}, "i_in")
     yield from _format_field(answers, "final_drive")
+    if get_value(answers, "wheel_radius") is not None:
+        yield from _format_field(answers, "wheel_radius")
 
 
 def _format_gears(answers: Answers, survey: LogSurvey | None) -> Iterator[str]:

@@ -145,7 +145,7 @@ def _derive_vehicle(answers: Answers) -> Iterator[tuple[Key, Answer]]:
 
     The radius counts with two standard deviations to either side, as a single mass does.
     """
-    mass, radius = get_value(answers, "vehicle", "mass"), get_value(answers, "vehicle", "radius")
+    mass, radius = get_value(answers, "vehicle", "mass"), get_value(answers, "wheel_radius")
     if mass is None or radius is None:
         return
     low, high = mass

@@ -67,7 +67,7 @@ def _answer_question(
     """Answer the question that an option replaces."""
     key = ORDER[option]
     without = {other: one for other, one in known.items() if other != key}
-    if key == ("vehicle", "radius"):
+    if key == ("wheel_radius",):
         without.setdefault(("vehicle", "mass"), Answer((1.0, 2.0)))
     if key == ("inertia", "J_vehicle"):
         without[("vehicle", "mass")] = Answer(None)

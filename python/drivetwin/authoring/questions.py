@@ -232,7 +232,7 @@ def _iterate_inertia_questions(answers: Answers, sources: Sources) -> Iterator[Q
         )  # fmt: skip
         mass = answers.get(("vehicle", "mass"))
         if mass is None or mass.value is not None:
-            yield make_question(("vehicle", "radius"))
+            yield make_question(("wheel_radius",))
         else:
             yield make_question(("inertia", "J_vehicle"), default=guess)
     yield make_question(("inertia", "J_out"), default=UNKNOWN)

@@ -6,6 +6,10 @@ from __future__ import annotations
 from drivetwin._util.request import BAR, CELSIUS, METRE, NM, RPM, SECOND, Request, option
 from drivetwin.calibration.policies.kind import PolicyKind
 
+USUAL_WHEEL_RADIUS = 0.5
+"""Wheel radius [m] where neither request nor twin have one: a heavy truck. It scales all
+accelerations alike."""
+
 
 class CalibrationOptions(Request):
     """Operating point (None: from the twin), policy, hardware and seed of a calibration.
@@ -13,7 +17,7 @@ class CalibrationOptions(Request):
     `engine_torque` [N m] and `engine_speed` [rad/s] are those at the shift request,
     `oil_temperature` [K] is by default that of the twin's log. `task` and `engine_lag` [s] are
     those of a closed slip loop. `system_pressure` [Pa] is by default the largest that the twin's
-    log has; `wheel_radius` [m].
+    log has; `wheel_radius` [m] is by default that of the twin, else `USUAL_WHEEL_RADIUS`.
     """
 
     engine_torque: float | None = option("Engine torque at the shift request.", unit=NM)
@@ -22,7 +26,11 @@ class CalibrationOptions(Request):
         "Oil temperature of the shift.", unit=CELSIUS, minimum=-40.0, maximum=180.0
     )
     system_pressure: float | None = option("Pressure of a held element.", unit=BAR)
-    wheel_radius: float = option("Dynamic tyre radius.", unit=METRE, minimum=0.05, default=0.5)
+    wheel_radius: float | None = option(
+        f"Dynamic tyre radius; by default that of the vehicle card, else {USUAL_WHEEL_RADIUS}.",
+        unit=METRE,
+        minimum=0.05,
+    )
     policy: PolicyKind = option(
         f"Unknowns: {PolicyKind.describe_all()}.", default=PolicyKind.CONTROLLER
     )

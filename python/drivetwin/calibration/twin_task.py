@@ -22,7 +22,7 @@ from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_gears
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.oil import OilFriction, OilState
-from drivetwin.calibration.options import CalibrationOptions
+from drivetwin.calibration.options import USUAL_WHEEL_RADIUS, CalibrationOptions
 from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.policy import Space
@@ -75,7 +75,8 @@ def build_task(twin: Twin, request: Request) -> Task:
     model = oil.warm(twin.build_dual_clutch(shift))
     point = _choose_point(twin, request)
     added, path = twin.build_added_elements(model), InputPath.from_twin(twin)
-    maneuver = Maneuver(model, point, request.wheel_radius, path=path, added=added)
+    radius = request.wheel_radius or twin.wheel_radius or USUAL_WHEEL_RADIUS
+    maneuver = Maneuver(model, point, radius, path=path, added=added)
     check_gears(maneuver)
     units = None
     if request.policy.commands_actuators:

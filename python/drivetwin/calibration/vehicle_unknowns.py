@@ -36,7 +36,7 @@ from drivetwin.twin.twin import (
     Twin,
 )
 from drivetwin.vehicle.effects import EffectId
-from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
+from drivetwin.vehicle.spec import describe_partner_level
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,14 @@ class FrictionUnknowns:
         return bool(values[0] > 0.0 and (values.size == 1 or values[0] + values[1] > 0.0))
 
     def build_curve(self, values: FloatArray, covariance: FloatArray, method: str) -> FrictionCurve:
-        """Build the curve of values (k,) with their covariance (k, k)."""
+        """Build the curve of values (k,) with their covariance (k, k), for the gain on the card."""
+        exact = self.build_exact_curve(values, covariance, method)
+        return exact if self.curve.gain is None else exact.add_gain_spread(self.curve.gain)
+
+    def build_exact_curve(
+        self, values: FloatArray, covariance: FloatArray, method: str
+    ) -> FrictionCurve:
+        """Build the curve of values (k,) with their covariance (k, k), for an exact gain."""
         curve, law, law_covariance = self.curve, None, None
         if curve.stribeck is None:
             scale, slopes = values[0] * np.ones_like(curve.mu), curve.mu[None]
@@ -70,7 +77,7 @@ class FrictionUnknowns:
         mu = scale * curve.mu
         place = np.interp(curve.points_slip, curve.slip, scale)
         return replace(
-            curve,
+            curve.drop_gain_spread(),
             mu=mu,
             mu_lo=mu - half,
             mu_hi=mu + half,
@@ -82,20 +89,21 @@ class FrictionUnknowns:
 
 
 def build_friction_unknowns(
-    element: str, partner: str, curves: Mapping[str, FrictionCurve], gain: float
+    element: str, partner: str, twin: Twin, gain: float
 ) -> FrictionUnknowns:
     """Build the friction of an element of a made unit, whose gain has the spread `gain`.
 
     An element without a curve has that of its partner, from which it departs as in an
     identification of a clutch that only disengages.
     """
-    own = curves.get(element)
-    curve = curves[partner] if own is None else own
+    own = twin.friction.get(element)
+    curve = _borrow_curve(twin, element, partner) if own is None else own
     law, known = curve.stribeck, None if own is None else compute_law_covariance(own)
     mean = np.ones(1) if law is None else to_values(law)
     scaled = np.ones(1) if law is None else mean * np.array([1.0, 1.0, 1.0, 0.0])
     if own is None:
-        covariance = _build_other_clutch(curve)
+        gains = (twin.elements[name].gain_prior for name in (element, partner))
+        covariance = _build_other_clutch(curve, describe_partner_level(*gains).std)
     elif known is not None:
         covariance = known
     else:
@@ -103,11 +111,18 @@ def build_friction_unknowns(
     return FrictionUnknowns(element, curve, mean, covariance + gain**2 * np.outer(scaled, scaled))
 
 
-def _build_other_clutch(curve: FrictionCurve) -> FloatArray:
-    """Covariance (k, k) of the friction of a clutch about that of another one."""
+def _borrow_curve(twin: Twin, element: str, partner: str) -> FrictionCurve:
+    """Return the friction curve of a partner as that of an element with a gain of its own."""
+    curve = twin.friction[partner].drop_gain_spread()
+    return curve if curve.gain is None else replace(curve, gain=twin.elements[element].gain_prior)
+
+
+def _build_other_clutch(curve: FrictionCurve, level: float) -> FloatArray:
+    """Covariance (k, k) of the friction of a clutch about that of another one; `level` is the
+    standard deviation of their ratio."""
     if curve.stribeck is None:
-        return np.array([[PARTNER_LEVEL_STD**2]])
-    return build_partner_spread(curve.stribeck)
+        return np.array([[level**2]])
+    return build_partner_spread(curve.stribeck, level)
 
 
 METHOD = "logs of a calibration"
@@ -244,7 +259,7 @@ class VehicleUnknowns:
     def describe_values(self, z: FloatArray, covariance: FloatArray) -> tuple[LearnedValue, ...]:
         """Describe standardised values (m,) with their covariance (m, m) beside those before.
 
-        The friction of an element is that at the middle slip of its curve.
+        The friction of an element is that at the middle slip of its curve, for an exact gain.
         """
         none, prior = np.zeros(z.size), self.root @ self.root.T
         total = self.root @ covariance @ self.root.T
@@ -258,7 +273,7 @@ class VehicleUnknowns:
         for one, part in self._pair_friction():
             row: list[float] = []
             for values, spread in ((self.to_values(none), prior), (self.to_values(z), total)):
-                curve = one.build_curve(values[part], spread[part, part], METHOD)
+                curve = one.build_exact_curve(values[part], spread[part, part], METHOD)
                 middle = curve.slip.size // 2
                 mu = float(curve.mu[middle])
                 row += [mu, (float(curve.mu_hi[middle]) - mu) / Z95]
@@ -335,7 +350,7 @@ def build_unknowns(
     drawn = [name for name in drawn if name not in own_ids]
     ids = (*drawn, *(name for name in (*contacts, PRESSURE_DELAY) if name not in drawn))
     friction = tuple(
-        build_friction_unknowns(one, partner, twin.friction, spread.gain)
+        build_friction_unknowns(one, partner, twin, spread.gain)
         for one, partner in (elements, elements[::-1])
     )
     own = [twin.get_value(name, 0.0) for name in ids]

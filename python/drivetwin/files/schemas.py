@@ -89,8 +89,8 @@ def _describe_keys(schema: dict[str, Any], kind: FileKind) -> None:
     """Add the meaning of each key to the schema of a card."""
     for field in read_key_fields(kind).values():
         if field.entry:
-            first = schema["properties"][field.key[0]]
-            tables = _iterate_tables(schema, first) if field.key[1:] else [schema["properties"]]
+            keys = schema["properties"]
+            tables = _iterate_tables(schema, keys[field.key[0]]) if field.key[1:] else [keys]
             for entries in tables:
                 entries.get(field.entry, {})["description"] = field.reference
 

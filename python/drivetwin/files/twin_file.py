@@ -99,6 +99,7 @@ class TransmissionRecord(Record):
     elements: dict[str, TwinElement]
     channels: dict[str, ChannelRecord] = Field(default_factory=dict)
     converter: Converter | None = None
+    wheel_radius: FiniteFloat | None = Field(default=None, gt=0, alias="wheel_radius_m")
 
 
 class TwinParameterRecord(ParameterRecord):
@@ -214,7 +215,7 @@ _TWIN_FIELDS = (
 )
 _GEARBOX_FIELDS = (
     *("i_in", "final_drive", "gears", "elements", "J_prime_range", "J_vehicle_range"),
-    "converter",
+    *("converter", "wheel_radius"),
 )
 
 

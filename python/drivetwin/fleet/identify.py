@@ -268,8 +268,10 @@ def _make_parameter_rows(found: Identification, card: VehicleCard, slip: float) 
 def _make_mu_row(name: str, curve: FrictionCurve, slip: float) -> Row:
     """μ at one slip of a curve, judged like any estimate by the width of its band.
 
-    The band holds all errors: what noise alone does to μ is no part of a curve.
+    The band contains all errors but that of the gain on the card, which all logs share. A curve
+    has no part by noise alone.
     """
+    curve = curve.drop_gain_spread()
     spec = get_parameter_spec(name)
     mu, low, high = (
         float(np.interp(slip, curve.slip, values))

@@ -105,7 +105,7 @@ def _check_inertias(card: VehicleCard) -> Iterator[Finding]:
     low, high = get_card_field(*key).usual
     if card.final_drive.value < 1.5:
         low /= 25.0  # referred to the output shaft
-    mass = high / min(get_card_field("vehicle", "radius").usual) ** 2
+    mass = high / min(get_card_field("wheel_radius").usual) ** 2
     why = f"mass times wheel radius squared, with masses beyond {mass / 1e3:.0f} t outside"
     wrong = [*_expect(card, key, *card.J_vehicle_range, limits=(low, high), why=why)]
     yield from wrong

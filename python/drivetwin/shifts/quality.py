@@ -14,7 +14,6 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import compute_middle
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _LATEST_REQUEST = 3.0
@@ -178,7 +177,7 @@ def compute_shift_quality(
     `wheel_jerk_max` = torque_rate_max·i_f/J_v; `vibration_dose` = (∫ a^4 dt)^¼ over the same time
     with a = i_f·(T_o - straight line through both ends)/J_v, the wheel's angular acceleration (eq.
     9; times the wheel radius: m/s^1.75 of ISO 2631-1, unweighted). J_v is `J_vehicle` [kg m2], or
-    the middle of the card's range. `friction_work`, `friction_power_max`: of the on-coming
+    that of the card. `friction_work`, `friction_power_max`: of the on-coming
     element in the inertia phase, T_c = T_o/iout (eq. 16; leaves out the output
     side's inertia and the drums) times the slip (eq. 15). Friction makes no energy: where more
     than 5 % of the work comes out negative the off-going element carries T_o, as in a power-on
@@ -201,7 +200,7 @@ def compute_shift_quality(
     figures |= _compute_residual_slip(speeds, clutch, shift)
     torque = _select_output_torque(log, shift)
     if torque is not None:
-        J_v = J_vehicle or compute_middle(card.J_vehicle_range)
+        J_v = J_vehicle or card.nominal_vehicle_inertia
         figures |= _measure_torque_hole(torque, ratios, shift)
         figures |= _compute_vibration(torque, shift, card.final_drive.value / J_v)
         figures |= _compute_friction_work(torque, speeds, clutch, shift)

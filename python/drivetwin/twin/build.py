@@ -70,6 +70,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
         load_law=load,
         converter=card.converter,
         actuators=_collect_actuators(found, card),
+        wheel_radius=None if card.wheel_radius is None else card.wheel_radius.value,
     )
 
 
@@ -100,7 +101,8 @@ def _build_element(card: VehicleCard, name: str, ratios: Mapping[str, float]) ->
     spec = card.elements[name]
     i_c, i_out = card.get_clutch_ratios(name)
     P0, drum = spec.P0.value, spec.drum_inertia.value
-    element = TwinElement(spec.kind, i_c, i_out, spec.gain.value, P0, spec.peak, drum)
+    gain = spec.gain
+    element = TwinElement(spec.kind, i_c, i_out, gain.value, P0, spec.peak, drum, gain.std)
     gear = next((one.name for one in card.gears if name in one.elements), None)
     return element if gear is None else element.replace_ratio(ratios[gear])
 
@@ -147,7 +149,8 @@ def list_borrowed_friction(found: Identification) -> list[str]:
         if _is_borrowed(found.friction.get(a)) and not _is_borrowed(found.friction.get(b))
     }
     return [
-        f"friction of {a} is taken to be that of {b}, ± {100.0 * PARTNER_LEVEL_STD:.0f} %"
+        f"friction of {a} is taken to be that of {b}, ± {100.0 * PARTNER_LEVEL_STD:.0f} % beside "
+        "the errors of both gains"
         for a, b in sorted(pairs)
     ]
 

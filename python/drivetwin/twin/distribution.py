@@ -26,7 +26,7 @@ from drivetwin.twin.friction_law import (
     to_values,
 )
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
+from drivetwin.vehicle.spec import describe_partner_level
 
 _NEGLIGIBLE = 1e-9
 """Variance of a direction over the largest below which it is rounding [ratio]."""
@@ -147,9 +147,10 @@ def _add_laws(
     law_ids = [make_law_id(one.name, key) for one in laws for key in LAW_KEYS]
     means = [to_values(one.friction) for one in laws if isinstance(one.friction, Stribeck)]
     scales = {one.name: compute_scale_std(curves.get(one.name)) for one in model.elements}
+    level = describe_partner_level(*(twin.elements[one.name].gain_prior for one in model.elements))
     for one in model.elements:
         if one.name not in curves and not isinstance(one.friction, Stribeck):
-            scales[one.name] = float(np.hypot(scales[one.name], PARTNER_LEVEL_STD))
+            scales[one.name] = float(np.hypot(scales[one.name], level.std))
     ids = (*known.ids, *law_ids)
     if all(name in twin.covariance_ids for name in law_ids):
         eta = twin.get_value("eta", 1.0) if twin.over_eta else 1.0
@@ -159,17 +160,19 @@ def _add_laws(
         size = len(known.ids)
         covariance[:size, :size] = known.covariance
     else:
-        blocks = [_describe_law(one, curves) for one in laws]
+        blocks = [_describe_law(one, curves, level.std) for one in laws]
         covariance = block_diag(known.covariance, *blocks)
     values = np.concatenate([known.values, *means])
     return replace(known, ids=ids, values=values, covariance=covariance, scales=scales)
 
 
-def _describe_law(one: ShiftElement, curves: Mapping[str, FrictionCurve]) -> FloatArray:
-    """Covariance (4, 4) of the law of an element by itself."""
+def _describe_law(
+    one: ShiftElement, curves: Mapping[str, FrictionCurve], level: float
+) -> FloatArray:
+    """Covariance (4, 4) of the law of an element by itself; `level` is that of a partner's law."""
     own = curves.get(one.name)
     if own is None and isinstance(one.friction, Stribeck):
-        return build_partner_spread(one.friction)
+        return build_partner_spread(one.friction, level)
     covariance = None if own is None else compute_law_covariance(own)
     return np.zeros((4, 4)) if covariance is None else covariance
 

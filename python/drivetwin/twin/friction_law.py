@@ -9,7 +9,7 @@ from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
-from drivetwin.vehicle.spec import PARTNER_LEVEL_STD, PARTNER_REST_STD
+from drivetwin.vehicle.spec import PARTNER_REST_STD
 
 
 def to_values(law: Stribeck) -> FloatArray:
@@ -37,22 +37,21 @@ def compute_law_covariance(curve: FrictionCurve) -> FloatArray | None:
 
 
 def compute_friction_std(curve: FrictionCurve | None) -> float:
-    """Relative standard deviation of μ in the middle of its curve; 0 without one."""
+    """Relative standard deviation of μ times gain in the middle of its curve; 0 without one.
+
+    That of the gain alone is left out: the motion depends on the product.
+    """
     if curve is None:
         return 0.0
+    curve = curve.drop_gain_spread()
     half = 0.5 * (curve.mu_hi - curve.mu_lo) / np.abs(curve.mu)
     half = half[np.isfinite(half)]
     return float(np.median(half)) / Z95 if half.size else 0.0
 
 
 def compute_scale_std(curve: FrictionCurve | None) -> float:
-    """Relative standard deviation of μ that its band has beside the covariance of its law.
-
-    That of the gain is left out: the motion depends on μ times the gain.
-    """
+    """Relative standard deviation of μ times gain beside the covariance of its law."""
     whole = compute_friction_std(curve)
-    if curve is not None:
-        whole = float(np.sqrt(max(whole**2 - curve.gain_spread**2, 0.0)))
     covariance = None if curve is None else compute_law_covariance(curve)
     if curve is None or curve.stribeck is None or covariance is None:
         return whole
@@ -61,9 +60,10 @@ def compute_scale_std(curve: FrictionCurve | None) -> float:
     return float(np.sqrt(max(whole**2 - float(np.median(variance)), 0.0)))
 
 
-def build_partner_spread(law: Stribeck) -> FloatArray:
+def build_partner_spread(law: Stribeck, level: float) -> FloatArray:
     """Build the covariance (4, 4) by which the values of an element's law depart from those of its
-    partner's `law`, where the log does not determine them."""
+    partner's `law`, where the log does not determine them; `level` is the standard deviation of
+    their ratio [-]."""
     scaled = to_values(law) * np.array([1.0, 1.0, 1.0, 0.0])
     rest = np.array([0.0, PARTNER_REST_STD, 0.0, 0.0])
-    return PARTNER_LEVEL_STD**2 * np.outer(scaled, scaled) + np.outer(rest, rest)
+    return level**2 * np.outer(scaled, scaled) + np.outer(rest, rest)

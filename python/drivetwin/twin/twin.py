@@ -79,6 +79,8 @@ class TwinElement:
     """Design data of one shift element: ratios of eq. 15, gain [m^3], P0 [Pa], drum [kg m^2].
 
     `P0` and `drum` are the card's values; identified parameters of the same name replace them.
+    `gain_std` [m^3] is the standard deviation of the gain. It acts where the log does not determine
+    the element's μ times gain.
     """
 
     kind: ElementKind
@@ -88,13 +90,19 @@ class TwinElement:
     P0: Annotated[float, Field(alias="P0_Pa")]
     peak: Annotated[float, Field(ge=1)]
     drum: Annotated[float, Field(ge=0, alias="drum_inertia_kgm2")]
+    gain_std: Annotated[float, Field(ge=0, alias="gain_std_m3")] = 0.0
+
+    @property
+    def gain_prior(self) -> PriorValue:
+        """Gain [m^3] with its distribution."""
+        return PriorValue(self.gain, self.gain_std)
 
     def to_spec(self, name: str) -> ElementSpec:
-        """Return the element as on a vehicle card, with all values known."""
-        gain, P0, drum, i_c, i_out = (
-            PriorValue(one) for one in (self.gain, self.P0, self.drum, self.i_c, self.i_out)
+        """Return the element as on a vehicle card, with all values known but the gain."""
+        P0, drum, i_c, i_out = (
+            PriorValue(one) for one in (self.P0, self.drum, self.i_c, self.i_out)
         )
-        return ElementSpec(name, self.kind, gain, P0, self.peak, drum, i_c, i_out)
+        return ElementSpec(name, self.kind, self.gain_prior, P0, self.peak, drum, i_c, i_out)
 
     def replace_ratio(self, gear_ratio: float) -> TwinElement:
         """Return the element in a gear of another ratio (without the input gear)."""
@@ -112,7 +120,7 @@ class Twin(DisplayMixin):
     ranges [kg m^2] are those of the vehicle card; `mapping` is the channel mapping of the log.
     `load_law` is the growth of the load torque with speed; None where it is constant. `converter`
     is the card's map of the torque converter, None where it has none. `actuators` are those of the
-    elements, from commands in the log or from the card.
+    elements, from commands in the log or from the card. `wheel_radius` [m] is that of the card.
     """
 
     name: str
@@ -137,6 +145,7 @@ class Twin(DisplayMixin):
     load_law: LoadLaw | None = None
     converter: Converter | None = None
     actuators: Mapping[str, IdentifiedActuator] = field(default_factory=dict)
+    wheel_radius: float | None = None
 
     def __repr__(self) -> str:
         gears = ", ".join(self.gears)
@@ -245,6 +254,7 @@ class Twin(DisplayMixin):
             J_vehicle_range=self.J_vehicle_range,
             converter=self.converter,
             remembered=self.mapping,
+            wheel_radius=None if self.wheel_radius is None else PriorValue(self.wheel_radius),
         )
 
     def _build_load(self, Tv_over_if: float, scale: float, final_drive: float) -> RoadLoad:

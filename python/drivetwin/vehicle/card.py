@@ -23,6 +23,7 @@ from drivetwin.vehicle.spec import (
     SensorTolerance,
     compute_brake_ratios,
     describe_inertia,
+    describe_wheel_radius,
     multiply,
 )
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -181,7 +182,7 @@ def load_card(path: Path | str) -> VehicleCard:
         "remove their leading #",
     )
     file = CardFile.model_validate(document)
-    J_out = file.inertia.J_out_kgm2
+    J_out, radius = file.inertia.J_out_kgm2, file.wheel_radius_m
     return VehicleCard(
         name=file.name,
         loss_law=file.loss_law,
@@ -200,6 +201,7 @@ def load_card(path: Path | str) -> VehicleCard:
         effects={EffectId(name): table.to_prior() for name, table in file.effects.items()},
         converter=None if file.converter is None else file.converter.to_spec(),
         sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
+        wheel_radius=None if radius is None else radius.to_prior(describe_wheel_radius),
     )
 
 

@@ -11,7 +11,7 @@ from pydantic import Field
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.schema import RatioEntry
+from drivetwin.vehicle.schema import RadiusEntry, RatioEntry
 from drivetwin.vehicle.spec import PriorValue
 
 
@@ -29,7 +29,7 @@ class RatioCardFile(StrictModel):
     name: str = ""
     gears: list[RatioGearTable] = Field(min_length=1)
     final_drive: RatioEntry | None = None
-    wheel_radius_m: float | None = Field(default=None, gt=0.1, lt=2.0)
+    wheel_radius_m: RadiusEntry | None = None
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,12 @@ def load_ratio_card(path: Path) -> RatioCard:
     if not is_ratio_card(path):
         card = load_card(path)
         ratios = {gear.name: gear.ratio for gear in card.gears}
-        return RatioCard(card.name, ratios, card.final_drive, None, str(path))
+        radius = None if card.wheel_radius is None else card.wheel_radius.value
+        return RatioCard(card.name, ratios, card.final_drive, radius, str(path))
     faults = validate_schema(document, RatioCardFile)
     raise_faults(faults, CardError, str(path), "correct these keys of the card of the ratios")
     file = RatioCardFile.model_validate(document)
     final = None if file.final_drive is None else file.final_drive.to_prior()
     ratios = {one.name: one.ratio.to_prior() for one in file.gears}
-    return RatioCard(file.name, ratios, final, file.wheel_radius_m, str(path))
+    radius = None if file.wheel_radius_m is None else file.wheel_radius_m.value
+    return RatioCard(file.name, ratios, final, radius, str(path))

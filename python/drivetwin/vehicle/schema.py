@@ -32,6 +32,7 @@ from drivetwin.vehicle.spec import (
     SensorTolerance,
     describe_assumed_gain,
     describe_fill_pressure,
+    describe_gain,
     describe_inertia,
     describe_ratio,
     parse_teeth,
@@ -107,6 +108,17 @@ PressurePrior = Annotated[PriorEntry, _limit_prior(MOST_PRESSURE)]
 InertiaPrior = Annotated[PriorEntry, _limit_prior(MOST_INERTIA)]
 
 
+class RadiusTable(PriorTable):
+    """A wheel radius [m] with its standard deviation."""
+
+    value: float = Field(ge=0.1, le=2.0)
+
+
+RadiusEntry = Annotated[
+    RadiusTable, BeforeValidator(_parse_bare_value, json_schema_input_type=RadiusTable | float)
+]
+
+
 class RatioTable(PriorTable):
     """A ratio and its standard deviation; 0 means exact."""
 
@@ -145,7 +157,7 @@ NO_INPUT_GEAR = RatioTable(value=1.0, std=0.0)
 
 
 class GainTable(StrictModel):
-    """Gain N·D·A·r [m^3] with its standard deviation; 0: μ is given for this gain.
+    """Gain N·D·A·r [m^3] with its standard deviation; 0: the gain is exact.
 
     `assumed` marks a gain that nobody knows.
     """
@@ -158,7 +170,7 @@ class GainTable(StrictModel):
         """Return the gain in SI."""
         if self.std is not None:
             return PriorValue(self.value, self.std, self.assumed)
-        return describe_assumed_gain(self.value) if self.assumed else PriorValue(self.value)
+        return (describe_assumed_gain if self.assumed else describe_gain)(self.value)
 
 
 GainEntry = Annotated[
@@ -262,7 +274,7 @@ class ElementTable(StrictModel):
         """N·D·A·r [m^3]."""
         if self.gain_m3 is not None:
             return self.gain_m3.to_prior()
-        return PriorValue(0.0 if self.geometry is None else self.geometry.gain)
+        return describe_gain(0.0 if self.geometry is None else self.geometry.gain)
 
     def to_spec(self, name: str) -> ElementSpec:
         """Return the element in SI."""
@@ -392,6 +404,7 @@ class CardFile(StrictModel):
     loss_law: LossLaw = "paper"
     i_in: RatioEntry = NO_INPUT_GEAR
     final_drive: RatioEntry
+    wheel_radius_m: RadiusEntry | None = None
     eta: PriorEntry | None = None
     gears: list[GearTable] = Field(min_length=2)
     elements: dict[str, ElementTable] = Field(min_length=1)

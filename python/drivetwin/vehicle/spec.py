@@ -3,8 +3,8 @@
 
 The distribution of a number as a person writes it is made here only. People round as well as cut.
 The true ratio is therefore uniform within one unit of the last written digit to either side, which
-has a standard deviation of 2/√12 = 0.58 of a unit. Digits say nothing about pressures, inertias and
-radii; their standard deviations are engineering estimates without a published source.
+has a standard deviation of 2/√12 = 0.58 of a unit. Digits say nothing about pressures, gains,
+inertias and radii; their standard deviations are engineering estimates without a published source.
 """
 
 from __future__ import annotations
@@ -150,6 +150,9 @@ fuel, driver and load."""
 WHEEL_RADIUS_STD = 0.02
 """Standard deviation of a wheel radius without a stated one [ratio]; engineering estimate: a tread
 of 8 to 15 mm wears, which is 2 to 3 % of the radius."""
+GAIN_STD = 0.05
+"""Standard deviation of a clutch gain without a stated one [ratio]; engineering estimate: area,
+radius and de-rating from a drawing, 3 to 5 %."""
 ASSUMED_GAIN_STD = 0.2
 """Standard deviation of a gain that is assumed from a usual μ [ratio]; engineering estimate: μ of a
 paper lining from 0.09 to 0.15, and the error of the product of μ and gain from a log."""
@@ -215,6 +218,11 @@ def describe_inertia(value: float) -> PriorValue:
     return PriorValue(value, INERTIA_STD * abs(value))
 
 
+def describe_gain(value: float) -> PriorValue:
+    """Return the distribution of a gain [m^3] without a stated standard deviation."""
+    return PriorValue(value, GAIN_STD * value)
+
+
 def describe_assumed_gain(value: float) -> PriorValue:
     """Return the distribution of an assumed gain [m^3] without a stated standard deviation."""
     return PriorValue(value, ASSUMED_GAIN_STD * value, assumed=True)
@@ -223,6 +231,16 @@ def describe_assumed_gain(value: float) -> PriorValue:
 def describe_wheel_radius(value: float) -> PriorValue:
     """Return the distribution of a wheel radius [m] without a stated standard deviation."""
     return PriorValue(value, WHEEL_RADIUS_STD * value)
+
+
+def describe_partner_level(*gains: PriorValue) -> PriorValue:
+    """Return the distribution of the friction of an element that the log does not determine, over
+    that of its partner [-], for the values of their `gains` [m^3].
+
+    The log determines the partner's μ·gain, so that the errors of both gains are errors of the
+    level.
+    """
+    return PriorValue(1.0, math.hypot(PARTNER_LEVEL_STD, *(one.std / one.value for one in gains)))
 
 
 def multiply(*factors: PriorValue) -> PriorValue:

@@ -18,6 +18,7 @@ from drivetwin.vehicle.spec import (
     PriorValue,
     SensorTolerance,
     compute_brake_ratios,
+    compute_middle,
 )
 
 
@@ -28,7 +29,8 @@ class VehicleCard:
     `gears` run from low to high. `final_drive` is i_f. `J_prime_range` [kg m^2] is the design
     range of J' at the engine, `J_vehicle_range` [kg m^2] that of J3 at the wheel; `J_out` [kg m^2]
     is the inertia of the output side before the shaft (Jo' without drums), `J1` [kg m^2] that of
-    the engine with what rotates with the gearbox input, None if unknown.
+    the engine with what rotates with the gearbox input, None if unknown. `wheel_radius` [m] is the
+    rolling radius of the driven wheels, None if unknown.
     `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
     parameters.py), `effects` what is known of unmodelled effects. `converter` is the map of
     the torque converter, None where the card has none. `remembered` is the mapping of the log of a
@@ -55,11 +57,18 @@ class VehicleCard:
     effects: Mapping[EffectId, EffectPrior] = field(default_factory=dict)
     sha256: str = ""
     remembered: RememberedMapping = field(default_factory=RememberedMapping)
+    wheel_radius: PriorValue | None = None
 
     @property
     def inputs(self) -> dict[str, str]:
         """SHA-256 by name of the file that the card was read from; empty without one."""
         return {Path(self.source).name: self.sha256} if self.sha256 else {}
+
+    @property
+    def nominal_vehicle_inertia(self) -> float:
+        """J3 at the wheel [kg m^2]: the stated value, else the middle of the range."""
+        known = self.known.get("J_vehicle")
+        return compute_middle(self.J_vehicle_range) if known is None else known.value
 
     def get_gear(self, name: str) -> Gear:
         """Return the gear of this name; raises CardError if the card has none."""

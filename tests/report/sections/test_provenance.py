@@ -32,4 +32,7 @@ def test_friction_that_the_simulation_borrows_is_among_what_is_assumed() -> None
         block for block in build_provenance_section(identification()).blocks
         if isinstance(block, NotesBlock)
     )  # fmt: skip
-    assert "friction of B2 is taken to be that of B3, ± 7 %" in assumed.items
+    assert (
+        "friction of B2 is taken to be that of B3, ± 7 % beside the errors of both gains"
+        in assumed.items
+    )

@@ -11,7 +11,7 @@ the sum of the three.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -54,6 +54,13 @@ from drivetwin.estimation.likelihood.uncertainty.friction_bands import (
     build_friction_curves,
     find_reference_slips,
 )
+from drivetwin.estimation.likelihood.uncertainty.torque_scale import (
+    OverEta,
+    TorqueScale,
+    estimate_absolute,
+    find_scale,
+    scale_covariance,
+)
 from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
 from drivetwin.estimation.optimize.objective import ParameterVector, find_acting, join_columns
 from drivetwin.estimation.result.cause import EXPLAINED, WRONG_ENTRY, PredictedSpread
@@ -69,18 +76,12 @@ from drivetwin.estimation.result.verdict import (
     add_systematic,
     adopt_verdicts,
     apply_errors,
-    assess,
     assess_friction,
-    assess_with_prior,
     compute_correlation,
-    from_prior,
     refuse_parameter,
-    reject_identified,
     report_gains,
 )
 from drivetwin.findings import Code, Finding, explain, report
-from drivetwin.parameters import OVER_ETA
-from drivetwin.vehicle.spec import PriorValue
 
 
 def predict_spread(
@@ -148,8 +149,6 @@ def _split(term: ShiftTerm, mean: FloatArray, std: FloatArray) -> dict[str, Pred
 
 
 DELAY = "te_delay"
-WITH_ETA = "likelihood over η, times η from design"
-"""Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_PRIOR = "likelihood with design prior"
 """Method of a parameter whose own design value took part in its estimate."""
 
@@ -204,7 +203,15 @@ def build_estimates(
     for name in ids if "" in subjects else subjects:
         estimates[name] = add_systematic(estimates[name], doubt[name])
     estimates = apply_errors(estimates, (*limits, *disagreements))
-    estimates |= _estimate_fixed(fit, signals, drivelines, estimates)
+    scale: TorqueScale | None = None
+    contradicted: list[Finding] = []
+    if not signals[0].scale_known:
+        over_eta = OverEta(values, fitted.covariance, own.covariance, estimates)
+        scale, contradicted = find_scale(over_eta, drivelines[0].known)
+        absolute = list_absolute_ids(signals)
+        estimates |= estimate_absolute(absolute, over_eta, scale, drivelines[0])
+    estimates |= _estimate_delays(fit, drivelines)
+    loads = tuple((1.0 if scale is None else scale.eta) * one for one in collect_loads(fit))
     curves = adopt_verdicts(curves, estimates)
     return EstimateSet(
         estimates,
@@ -217,18 +224,19 @@ def build_estimates(
             *limits,
             *(() if cause is None else (report_cause(cause, corrected, values, matrix, std),)),
             *(one for one in disagreements if one.subject not in estimates),
+            *contradicted,
             *find_null_directions(fit),
-            *report_different_loads(collect_loads(fit)),
+            *report_different_loads(loads),
             *report_refined(fitted.priors, estimates),
             *report_gains(curves, estimates),
             *_check_levels(fit, corrected),
             *_check_other_law(fit, signals, dict(zip(ids, matrix, strict=True))),
         ),
         _build_load_law(fit, corrected),
-        collect_loads(fit),
+        loads,
         predict_spread(fit, predicted),
         cause,
-        own.joint,
+        own.joint if scale is None else scale_covariance(own.joint, own.every, scale),
         rank_card_numbers(corrected, ids, matrix),
     )
 
@@ -249,10 +257,11 @@ def _check_other_law(
 class _ReportedParameters:
     """Reported parameters of a correction: `values` by id, their `jacobian` (k, p) by the
     unknowns, total `covariance` (k, k) and `std` (k,). `joint` is the total covariance with the
-    friction laws."""
+    friction laws, `every` the values of both by id."""
 
     fitted: FittedParameters
     values: Mapping[str, float]
+    every: Mapping[str, float]
     jacobian: FloatArray
     covariance: FloatArray
     std: FloatArray
@@ -291,7 +300,7 @@ def _fit_parameters(
         prior_method=WITH_PRIOR,
         total=covariance,
     )
-    return _ReportedParameters(fitted, values, matrix, covariance, std, joint)
+    return _ReportedParameters(fitted, values, every, matrix, covariance, std, joint)
 
 
 def _check_levels(fit: LikelihoodFit, corrected: Correction) -> list[Finding]:
@@ -321,20 +330,12 @@ def _is_card_likelier(fitted: FittedParameters, correction: Correction) -> bool:
     return against > effects + WRONG_ENTRY
 
 
-def _estimate_fixed(
-    fit: LikelihoodFit,
-    signals: Sequence[ShiftSignals],
-    drivelines: Sequence[KnownDriveline],
-    estimates: Mapping[str, Estimate],
+def _estimate_delays(
+    fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]
 ) -> dict[str, Estimate]:
-    """Build the estimates of quantities that the fit holds fixed: absolute values of torque-like
-    parameters without an output torque, and the delay of an engine torque that hardly moves."""
+    """Build the estimates of delays that the fit holds fixed: those of an engine torque that hardly
+    moves."""
     found: dict[str, Estimate] = {}
-    if not signals[0].scale_known:
-        eta = drivelines[0].known.get("eta")
-        for name in list_absolute_ids(signals):
-            ratio = estimates.get(name + OVER_ETA)
-            found[name] = _estimate_without_scale(name, eta, ratio, drivelines[0].find_prior(name))
     for one in (term.structure for term in fit.problem.terms):
         if one.get_unknown(DELAY) not in fit.point.names and DELAY not in drivelines[0].known:
             name = make_log_id(DELAY, one.log)
@@ -350,32 +351,6 @@ def _build_load_law(fit: LikelihoodFit, corrected: Correction) -> LoadLaw | None
     std = float(np.sqrt(corrected.covariance[k, k]))
     mean_speed = term.structure.mean_speed
     return LoadLaw(corrected.mean[AERO], std, mean_speed, over_eta=not term.scale_known)
-
-
-def _estimate_without_scale(
-    name: str, eta: PriorValue | None, ratio: Estimate | None, design: PriorValue | None
-) -> Estimate:
-    """Estimate a torque-like parameter of a log without an output torque.
-
-    Identifiable only if η is known from design: the ratio times η, with the spread of η as a
-    systematic part.
-    """
-    if eta is None:
-        reason = explain(Code.NO_TORQUE_SCALE)
-        return Estimate(name, None, None, Verdict.NOT_IDENTIFIABLE, METHOD, reason=reason)
-    if ratio is None:
-        return from_prior(name, eta)
-    if ratio.value is None or ratio.std_noise is None:
-        return replace(ratio, id=name)
-    spread = float(np.hypot(eta.value * (ratio.std_systematic or 0.0), eta.std * ratio.value))
-    value, noise = eta.value * ratio.value, eta.value * ratio.std_noise
-    if ratio.verdict is Verdict.DESIGN:
-        return replace(ratio, id=name, value=value, std_noise=noise, std_systematic=spread)
-    if design is not None:
-        one = assess_with_prior((name, value, noise), design, WITH_ETA, spread, ratio.reason)
-    else:
-        one = assess(name, value, noise, WITH_ETA, spread, ratio.reason)
-    return one if ratio.verdict is Verdict.IDENTIFIED else reject_identified(one, "")
 
 
 def _compute_std(matrix: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -50,7 +50,7 @@ from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
 from drivetwin.shifts.shift import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw
-from drivetwin.vehicle.spec import PARTNER_LEVEL_STD, PARTNER_REST_STD, PriorValue
+from drivetwin.vehicle.spec import PARTNER_REST_STD, PriorValue, describe_partner_level
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ RATIO_REACH = 10.0
 """Distance from its nominal value within which a ratio is sought, in standard deviations of the
 card's number: the speeds show it far better, and far off the elements would have other signs."""
 FOLLOWER_PRIOR = {
-    "level": PriorValue(1.0, PARTNER_LEVEL_STD),
+    "level": describe_partner_level(),
     "rest": PriorValue(0.0, PARTNER_REST_STD),
 }
 """Friction of an element that only disengages, relative to the law of its partner [-]. The standard
@@ -325,9 +325,8 @@ def _collect_priors(
     for name in _list_law_coefficients(signals, drivelines):
         found[name] = law[name.split(".")[-1]]
     for one, partner in _find_partners(signals, drivelines).items():
-        level, gains = FOLLOWER_PRIOR["level"], (drivelines[0].couplings[e] for e in (one, partner))
-        spread = float(np.linalg.norm([level.std, *(e.gain_std / e.gain for e in gains)]))
-        found[f"{one}.level"] = PriorValue(level.value, spread)
+        gains = (drivelines[0].couplings[e].gain_prior for e in (one, partner))
+        found[f"{one}.level"] = describe_partner_level(*gains)
     for d in drivelines:
         found |= d.ratio_priors
         for e in (d.offgoing, d.oncoming):

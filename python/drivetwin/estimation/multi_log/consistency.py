@@ -76,8 +76,10 @@ def _downgrade(one: Estimate, move: LogPull) -> Estimate:
 def _widen(curve: FrictionCurve, move: LogPull | None) -> FrictionCurve:
     if move is None:
         return curve
-    half = 0.5 * abs(move.z) * (curve.mu_hi - curve.mu_lo)
-    return replace(curve, mu_lo=curve.mu - half, mu_hi=curve.mu + half)
+    exact = curve.drop_gain_spread()
+    half = 0.5 * abs(move.z) * (exact.mu_hi - exact.mu_lo)
+    wide = replace(exact, mu_lo=curve.mu - half, mu_hi=curve.mu + half)
+    return wide if curve.gain is None else wide.add_gain_spread(curve.gain)
 
 
 def pool_curves(alone: Sequence[Identification]) -> dict[str, FrictionCurve]:

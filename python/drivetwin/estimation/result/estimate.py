@@ -126,6 +126,18 @@ class FrictionCurve:
         """Relative standard deviation of the gain; 0 where none is stated."""
         return 0.0 if self.gain is None else self.gain.std / self.gain.value
 
+    def drop_gain_spread(self) -> FrictionCurve:
+        """Return the curve as μ for an exact gain, with the band that μ times gain has."""
+        if self.gain is None:
+            return self
+        spread = Z95 * self.mu * self.gain_spread
+        below, above = (
+            np.sqrt(np.maximum((end - self.mu) ** 2 - spread**2, 0.0))
+            for end in (self.mu_lo, self.mu_hi)
+        )
+        exact = replace(self.gain, std=0.0)
+        return replace(self, mu_lo=self.mu - below, mu_hi=self.mu + above, gain=exact)
+
     def add_gain_spread(self, gain: PriorValue) -> FrictionCurve:
         """Return the curve as μ for `gain`, whose standard deviation widens the band."""
         spread = Z95 * self.mu * gain.std / gain.value

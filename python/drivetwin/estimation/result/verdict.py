@@ -335,13 +335,12 @@ def compute_mu_gain(curve: FrictionCurve) -> tuple[float, float]:
     """
     if curve.gain is None:
         raise ValueError("the curve has no gain")
+    exact = curve.drop_gain_spread()
     mu, low, high = (
         float(np.interp(curve.middle_slip, curve.slip, each))
-        for each in (curve.mu, curve.mu_lo, curve.mu_hi)
+        for each in (exact.mu, exact.mu_lo, exact.mu_hi)
     )
-    total = (high - low) / (2.0 * Z95)
-    std = float(np.sqrt(max(total**2 - (mu * curve.gain_spread) ** 2, 0.0)))
-    return curve.gain.value * mu, curve.gain.value * std
+    return curve.gain.value * mu, curve.gain.value * (high - low) / (2.0 * Z95)
 
 
 def adopt_verdicts(
