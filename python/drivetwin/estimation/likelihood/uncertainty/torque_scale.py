@@ -68,7 +68,7 @@ class TorqueScale:
         """Standard deviation of η·ratio by a `covariance` (k, k) of the values; `row` (k,) is the
         derivative of the ratio by them."""
         slope = self.eta * row + ratio * self.slopes
-        return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
