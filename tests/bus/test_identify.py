@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +18,7 @@ from drivetwin.findings import Code
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.vehicle.spec import PriorValue
-from tests.shifts.fixtures import shared
+from tests.shifts.fixtures import make_log, shared
 
 DRIVES = (0, 3, 4, 9, 12)
 RATIOS = {"7": 2.61, "8": 1.94, "9": 1.39}
@@ -96,3 +97,28 @@ def test_the_automated_clutch_has_named_phases() -> None:
     assert np.isclose(shift.lockup or 0.0, 1.2, atol=0.1)
     assert found.estimates["eta"].value is None
     assert "torque meter" in found.estimates["eta"].reason
+
+
+def make_shift_log(name: str, held: float) -> ShiftLog:
+    """A shift into a gear that is held for `held` [s] with an oscillation of 0.85 Hz."""
+    rng = np.random.default_rng(len(name) + round(10.0 * held))
+    time = np.arange(0.0, 2.4 + held, 0.01)
+    since = np.maximum(time - 2.4, 0.0)
+    swing = np.exp(-0.3 * since) * np.sin(2.0 * np.pi * 0.85 * since)
+    output = 80.0 + 3.0 * swing * (since > 0.0)
+    ratio = np.interp(time, [2.0, 2.4], [2.0, 1.5])
+    noise = rng.normal(0.0, 0.02, (2, time.size))
+    speeds = {"input_speed": ratio * output + noise[0], "output_speed": output + noise[1]}
+    log = make_log({role: (time, values) for role, values in speeds.items()})
+    return replace(log, source=name)
+
+
+def test_a_held_out_decay_shorter_than_a_period_is_not_predicted() -> None:
+    card = make_card({"1": 2.0, "2": 1.5})
+    fitted = [make_shift_log(f"fitted_{k}", 2.5) for k in ("a", "bb")]
+    found = identify_bus(fitted, card, [make_shift_log("held", 1.15)])
+    assert found.decays["2"].compute_frequency()[0] == pytest.approx(0.85, abs=0.05)
+    assert not found.predictions
+    (one,) = [each for each in found.findings if each.code is Code.BUS_DECAY_SHORT]
+    assert "shorter than a period" in one.text
+    assert identify_bus(fitted, card, [make_shift_log("held", 2.5)]).predictions
