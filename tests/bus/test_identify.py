@@ -14,6 +14,7 @@ import pytest
 from drivetwin.bus.identify import BusIdentification, identify_bus
 from drivetwin.bus.phases import PhaseName
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import MissingChannelError, NoShiftError
 from drivetwin.findings import Code
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.ratio_card import RatioCard
@@ -122,3 +123,15 @@ def test_a_held_out_decay_shorter_than_a_period_is_not_predicted() -> None:
     (one,) = [each for each in found.findings if each.code is Code.BUS_DECAY_SHORT]
     assert "shorter than a period" in one.text
     assert identify_bus(fitted, card, [make_shift_log("held", 2.5)]).predictions
+
+
+def test_a_log_without_a_usable_gearbox_speed_is_refused() -> None:
+    log = make_shift_log("lost", 2.5)
+    channels = dict(log.channels)
+    channels["wheel_speed"] = replace(channels.pop("output_speed"), role="wheel_speed")
+    with pytest.raises(MissingChannelError, match="output_speed"):
+        identify_bus([replace(log, channels=channels)])
+    speed = log["output_speed"]
+    lost = replace(speed, values=np.full_like(speed.values, np.nan))
+    with pytest.raises(NoShiftError):
+        identify_bus([replace(log, channels={**log.channels, "output_speed": lost})])

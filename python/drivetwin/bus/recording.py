@@ -11,7 +11,9 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_pauses
+from drivetwin.errors import MissingChannelError, Where
 from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.tcu_flags import find_flag_spans
 
@@ -96,13 +98,26 @@ class BusLog:
 
 
 def prepare_bus_log(log: ShiftLog, label: str) -> BusLog:
-    """Prepare a log that has input and output speed."""
+    """Prepare a log that has input and output speed.
+
+    Raises MissingChannelError without an output speed, or an input or engine speed.
+    """
     signals = {role: _prepare(log[role]) for role in (*SPEEDS, "engine_torque") if role in log}
-    if "input_speed" not in signals:
-        signals["input_speed"] = signals["engine_speed"]
+    if "engine_speed" in signals:
+        signals.setdefault("input_speed", signals["engine_speed"])
+    for role in FOR_SHIFTS:
+        if role not in signals:
+            raise MissingChannelError(
+                f"no channel for {role!r}: without it no ratio can be formed",
+                "name the speed of that gearbox shaft in a channel mapping file (--channels); a "
+                "wheel speed does not stand in on a bus log",
+                Where(file=log.source),
+            )
     flag = log.channels.get("shift_in_process")
-    both = [signals["input_speed"], signals["output_speed"]]
-    span = (max(float(one.time[0]) for one in both), min(float(one.time[-1]) for one in both))
+    both = [signals[role] for role in FOR_SHIFTS]
+    span = (0.0, 0.0)
+    if all(one.time.size for one in both):
+        span = (max(float(one.time[0]) for one in both), min(float(one.time[-1]) for one in both))
     gaps = tuple(gap for one in both for gap in find_pauses(one.time))
     return BusLog(
         label,
