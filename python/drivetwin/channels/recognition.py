@@ -65,17 +65,17 @@ def infer_candidates(
         for column in columns
         if "." in column.name or "/" in column.name
     ]
-    spelled = [[one for one in some if words.can_spell(one[1])] for some in (wholes, parts)]
+    spelled = [
+        [one for one in some if one[0].empty is empty and words.can_spell(one[1])]
+        for empty in (False, True)
+        for some in (wholes, parts)
+    ]
     added = {role: "|".join(some) for role, some in own.items()}
     found = {
-        role: _select_first_match(spelled, filter(None, (added.get(role), *some)))
+        role: _select_first_match(spelled, [one for one in (added.get(role), *some) if one])
         for role, some in patterns.items()
     }
-    chosen = {
-        role: _drop_secondary(prefer_filled(candidates))
-        for role, candidates in found.items()
-        if candidates
-    }
+    chosen = {role: _drop_secondary(some) for role, some in found.items() if some}
     return add_extra_candidates(chosen, wholes, own)
 
 
@@ -121,8 +121,8 @@ def _select_first_match(
 ) -> list[Column]:
     """Return the columns that match the first pattern of `patterns` that matches any column.
 
-    Of the `spellings` of the columns the second, the last part of a name like `log.EngTrq`, counts
-    only where no whole name matches.
+    Each of the `spellings` counts only where those before match none: the last part of a name like
+    `log.EngTrq` after whole names, columns without numbers after those with.
     """
     patterns = tuple(patterns)
     for texts in filter(None, spellings):

@@ -60,11 +60,20 @@ def find_raster(time: FloatArray, values: FloatArray) -> UpdateRaster | None:
     if not is_time_axis(time):
         return None
     found = find_change_raster(time, values)
-    if found is None:
+    if found is None or not _shows_updates(time, values):
         return None
     if found.loose:
         return UpdateRaster(float(time[0]), found.period)
     return _make_raster(found, _find_clock(time))
+
+
+def _shows_updates(time: FloatArray, values: FloatArray) -> bool:
+    """Return True if most changes follow at once on a sample.
+
+    A change after a pause came at any time within it: pauses at even distances are no raster.
+    """
+    changes = np.count_nonzero(values[1:] != values[:-1])
+    return 2 * np.count_nonzero(_find_changes(time, values)) >= changes
 
 
 def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from drivetwin.channels.mapping import make_spec
-from drivetwin.channels.read_options import ChannelSpec, Column
+from drivetwin.channels.mapping_file import read_project_mapping
+from drivetwin.channels.read_options import ChannelSpec, Column, ReadOptions
 from drivetwin.channels.recognition import find_candidates
 from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.estimation.data.noise import prepare_signal
@@ -18,6 +19,7 @@ from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.open_mapped import open_stated
 from drivetwin.logs.read import read_channels
 from drivetwin.simulation.dual_clutch import Signal
 
@@ -32,8 +34,10 @@ def read_recording(
     quantities = {name: find_input_quantity(name, model.elements) for name in channels.inputs}
     for name, output in model.outputs.items():
         quantities[name] = get_output_quantity(output)
-    specs = _find_columns(path, {**channels.inputs, **channels.outputs}, channels.roles)
-    found, findings = read_channels(path, specs, quantities)
+    options = _find_options(path)
+    stated = {**channels.inputs, **channels.outputs}
+    specs = _find_columns(path, stated, channels.roles, options)
+    found, findings = read_channels(path, specs, quantities, options)
     signals = {name: prepare_signal(channel) for name, channel in found.items()}
     inputs = {name: Signal(signals[name].time, signals[name].values) for name in channels.inputs}
     outputs = {
@@ -44,8 +48,17 @@ def read_recording(
     return Recording(inputs, outputs, channels.known), findings
 
 
+def _find_options(path: Path) -> ReadOptions:
+    """Return the options of `channels.toml` beside the log, unless it is for other logs."""
+    stated = read_project_mapping(path)
+    if stated.file is None:
+        return stated.options
+    with open_stated(path, stated) as (_, used):
+        return used.options
+
+
 def _find_columns(
-    path: Path, specs: Mapping[str, ChannelSpec], roles: Mapping[str, str]
+    path: Path, specs: Mapping[str, ChannelSpec], roles: Mapping[str, str], options: ReadOptions
 ) -> dict[str, ChannelSpec]:
     """Return the specs with the columns that are recognised by role.
 
@@ -53,7 +66,7 @@ def _find_columns(
     """
     if not roles:
         return dict(specs)
-    with open_recording(path) as recording:
+    with open_recording(path, options) as recording:
         columns = recording.columns
     return {
         name: _pick_column(path, one, roles[name], columns) if name in roles else one

@@ -31,6 +31,7 @@ from drivetwin.fleet.rows import MU, Found, Row, RowKind, make_estimate_row
 from drivetwin.fleet.scan import compute_input_hashes
 from drivetwin.fleet.task import ShiftRow, Task, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.open_mapped import NOTHING_STATED
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.pipeline import identify
@@ -117,7 +118,7 @@ def identify_log(task: Task) -> Found:
         means = [*_average_means(task, mapping), *found_together.rows]
         return replace(found_together, rows=means)
     card = _load_card(recipe)
-    log = read_log(Path(task.path), card, mapping)
+    log = read_log(Path(task.path), card, mapping or NOTHING_STATED)
     _check_inputs(recipe)
     if log.sha256 != task.content:
         raise FileFormatError(

@@ -14,6 +14,7 @@ from drivetwin.fleet.parts import convert_write_errors
 from drivetwin.fleet.rows import Found, Row, RowKind, make_estimate_row
 from drivetwin.fleet.sources import name_members
 from drivetwin.fleet.task import ShiftRow, Task
+from drivetwin.logs.open_mapped import NOTHING_STATED
 from drivetwin.logs.read import read_log
 from drivetwin.report.bus_outcome import BusOutcome, identify_vehicle
 from drivetwin.vehicle.ratio_card import load_ratio_card
@@ -31,7 +32,7 @@ def identify_members(task: Task, mapping: Path | None) -> Found:
     rows: list[Row] = []
     for (path, content), name in zip(task.members, names, strict=True):
         try:
-            log = read_log(Path(path), None, mapping)
+            log = read_log(Path(path), None, mapping or NOTHING_STATED)
         except DrivetwinError as error:
             if len(rows) + 1 == len(task.members):
                 raise

@@ -15,7 +15,7 @@ from drivetwin._util.regular_file import compute_digest
 from drivetwin.channels.commands import check_commands
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
-from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.channels.mapping_file import read_mapping, read_project_mapping
 from drivetwin.channels.read_options import (
     ChannelSpec,
     ReadOptions,
@@ -97,8 +97,9 @@ def read_log(
 ) -> ShiftLog:
     """Read a shift log: every mapped channel on its own time base, SI inside.
 
-    Columns come from the `mapping` (a file, or one that was read), else from the card's [channels],
-    else from the log of the twin that the card is of, else by name. `needed`
+    Columns come from the `mapping` (a file, or one that was read), without one from channels.toml
+    beside the log, else from the card's [channels], else from the log of the twin that the card is
+    of, else by name. An empty `Mapped` leaves channels.toml aside. `needed`
     are the roles that must exist (or their stand-in: engine for input speed, wheel for output
     speed); what else there is comes along. Only mapped columns are read, in a `window` (first and
     last time [s] as the log counts it, before any time_shift) only the samples inside. Without a
@@ -114,9 +115,10 @@ def read_log(
     TimeError, DamagedChannelError, PlausibilityError; each contains a remedy.
     """
     path = _require_path(path)
-    stated = mapping or Mapped({})
-    if not isinstance(stated, Mapped):
-        stated = read_mapping(Path(stated))
+    if isinstance(mapping, Mapped):
+        stated = mapping
+    else:
+        stated = read_project_mapping(path) if mapping is None else read_mapping(Path(mapping))
     with ExitStack() as stack:
         with _STAGES.enter("opening"):
             recording, stated = stack.enter_context(open_as_mapped(path, stated, card))

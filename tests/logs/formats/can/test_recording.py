@@ -133,7 +133,10 @@ def test_another_bus_by_its_dbc(tmp_path: Path) -> None:
     log.write_text("".join(f"({0.01 * k:.6f}) can0 123#{row}\n" for k, row in enumerate(rows)))
     with pytest.raises(MissingChannelError, match="none of the 1 identifiers") as caught:
         read_raw(log)
-    assert 'bus = { dbc = ["bus.dbc"] }' in caught.value.remedy
+    stated = 'bus = { dbc = ["bus.dbc"] }'
+    assert stated in caught.value.remedy
+    (tmp_path / "channels.toml").write_text(stated)
+    assert "input_speed" in read_log(log, None, needed=())
     found = by_name(log, ReadOptions(bus=BusOptions((tmp_path / "bus.dbc",))))
     assert found["n_in"].values == pytest.approx(1000.0 + 0.25 * np.arange(20))
     assert (found["n_ab"].unit, found["n_ab"].group) == ("rpm", "Speeds")
@@ -211,3 +214,21 @@ def test_a_clock_that_runs_back_for_long_refuses_the_signal(first: float) -> Non
     recording = record(stamps, [bytes([k % 200]) for k in range(300)])
     with pytest.raises(DamagedChannelError, match="299 of 300 frames have an earlier stamp"):
         recording.load(0)
+
+
+def test_the_fault_of_a_signal_reaches_the_user(tmp_path: Path) -> None:
+    """A clock that was set refuses the only candidate of a role; another sensor takes its place."""
+    (tmp_path / "bus.dbc").write_text(DBC)
+    (tmp_path / "channels.toml").write_text('bus = { dbc = ["bus.dbc"] }')
+    log = tmp_path / "bus.log"
+    stamps = [*(0.01 * np.arange(100)), *(0.01 * np.arange(100))]
+    rows = [struct.pack("<HH", 4000 + k, 2000 + k).hex() for k in range(200)]
+    lines = [f"({at:.6f}) can0 123#{row}" for at, row in zip(stamps, rows, strict=True)]
+    log.write_text("\n".join(lines) + "\n")
+    with pytest.raises(DamagedChannelError, match="99 of 200 frames have an earlier stamp"):
+        read_log(log, None)
+    other = DBC.replace("291 Speeds", "292 Turbine")
+    (tmp_path / "bus.dbc").write_text(DBC + other.partition("BU_: A\n")[2])
+    sound = [f"({0.01 * k:.6f}) can0 124#{row}" for k, row in enumerate(rows)]
+    log.write_text("\n".join([*lines, *sound]) + "\n")
+    assert read_log(log, None, sound=())["input_speed"].values.size == 200

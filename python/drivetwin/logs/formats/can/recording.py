@@ -140,9 +140,9 @@ class BusRecording:
         there, order = _select_ordered(track, there, where)
         notes += order
         if not there.any():
-            raise DamagedChannelError(
-                "; ".join(notes) or "no frame holds this signal", "map another channel", where
-            )
+            kind = DamagedChannelError if short.any() else _SilentSignalError
+            what = "; ".join(notes) or "no frame holds this signal"
+            raise kind(what, "map another channel", where)
         return RawChannel(
             signal.name, signal.unit, track.time[there], values[there], track.group, tuple(notes)
         )
@@ -210,20 +210,23 @@ class BusRecording:
             return options.reference_torque, (
                 f"reference torque {options.reference_torque:g} N·m as the mapping states"
             )
+        why = "the bus has no reference torque (EC1)"
         for track in tracks:
             for signal in track.message.signals:
                 if signal.spn != torque.REFERENCE:
                     continue
                 try:
                     torques = self._decode_signal(track, signal).values
-                except DamagedChannelError:
+                except DamagedChannelError as fault:
+                    why = f"the reference torque of {track.group} cannot be used: {fault.what}"
                     continue
-                if np.ptp(torques) == 0.0 and torques[0] > 0.0:
-                    size = float(torques[0])
-                    return size, f"reference torque {size:g} N·m from {track.group}"
+                least, most = float(torques.min()), float(torques.max())
+                if least == most > 0.0:
+                    return most, f"reference torque {most:g} N·m from {track.group}"
+                why = f"the reference torque of {track.group} is from {least:g} to {most:g} N·m"
         return None, (
-            "percent torque stays in percent, the bus has no reference torque (EC1); state it in "
-            "the channel mapping: bus = { reference_torque_Nm = ... }"
+            f"percent torque stays in percent, {why}; state it in the channel mapping: "
+            "bus = { reference_torque_Nm = ... }"
         )
 
 
@@ -242,12 +245,20 @@ def _drop_named(
     return there & ~lost, [note for note in notes if note]
 
 
+class _SilentSignalError(DamagedChannelError):
+    """Signal whose sender never sends a value."""
+
+
 def _make_marked_column(entry: _Entry) -> Column:
-    """Build the column; mark signals that are never available, and senders with few frames."""
+    """Build the column; mark signals that are never available, and senders with few frames.
+
+    A damaged signal stays a candidate for a role, so that its fault reaches the user.
+    """
     try:
         return replace(entry.column, empty=entry.decode().time.size < MIN_SAMPLES)
-    except DamagedChannelError:
-        return replace(entry.column, empty=True, silent=True)
+    except DamagedChannelError as fault:
+        is_silent = isinstance(fault, _SilentSignalError)
+        return replace(entry.column, empty=True, silent=is_silent)
 
 
 def _select_ordered(
