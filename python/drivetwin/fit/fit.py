@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,8 +21,19 @@ from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import Problem, search
 from drivetwin.fit.starts import drop_redundant_speeds, guess_start, list_starts
 from drivetwin.fit.term import NetworkTerm, Plant
-from drivetwin.fit.unknown import SoughtNumber, require_known_places, resolve_unknown
-from drivetwin.simulation.element_schema import find_element_faults, list_inputs, refuse_faults
+from drivetwin.fit.unknown import (
+    SoughtNumber,
+    require_distinct_places,
+    require_known_places,
+    resolve_unknown,
+)
+from drivetwin.simulation.element_schema import (
+    GROUND,
+    find_element_faults,
+    list_inputs,
+    list_ports,
+    refuse_faults,
+)
 from drivetwin.simulation.network import make_input
 
 _DELAY_REACH = 5.0
@@ -83,6 +95,7 @@ def build_problem(
     """Build the objective, the first guess of all its unknowns, and those of the network."""
     _require_consistent(model, recordings)
     sought = [resolve_unknown(name, one, model.elements) for name, one in model.unknowns.items()]
+    require_distinct_places(sought)
     found = _Coordinates([], [], {}, [])
     for one in sought:
         found.add(one.name, one.start, one.spread, one.limits)
@@ -91,8 +104,8 @@ def build_problem(
     for number, recording in enumerate(recordings, start=1):
         _require_inputs(model, recording)
         names = list_starts(model.start, model.elements)
-        require_known_places(sought, names, [*recording.inputs, *model.inputs])
-        _require_known_starts(recording, names)
+        require_known_places(sought, names, {**recording.inputs, **model.inputs})
+        _require_known_starts(recording, names, sought)
         record = build_network_record(recording, list(model.outputs), _find_reach(sought))
         plant = _build_plant(plain, model, recording, record)
         guess = guess_start(plant.start, recording.start, model.elements, model.outputs, record)
@@ -110,6 +123,8 @@ def build_problem(
     point = ParameterVector(tuple(found.names), np.array(found.values))
     for term in terms:
         term.simulate(point)  # raises InputError for a start or output that the network lacks
+    for recording in recordings:
+        _require_used(model, recording)
     return LikelihoodObjective(tuple(terms), prior, lower, upper), point, sought
 
 
@@ -143,9 +158,16 @@ def _find_reach(sought: Sequence[SoughtNumber]) -> dict[str, float]:
     return reach
 
 
-def _require_known_starts(recording: Recording, names: Sequence[str]) -> None:
-    """Raise InputError for a known start of a node or shaft that the model does not start."""
+def _require_known_starts(
+    recording: Recording, names: Sequence[str], sought: Sequence[SoughtNumber]
+) -> None:
+    """Raise InputError for a known start of a node or shaft that the model does not start, or that
+    is an unknown."""
     for name in recording.start:
+        owner = next((one.name for one in sought if f"start.{name}" in one.factors), None)
+        if owner is not None:
+            what = f"start.{name}: known by the recording, and set by the unknown {owner!r}"
+            raise InputError(what, "leave it out of the start of the recording, or the unknowns")
         if name not in names:
             hint = suggest_spelling(name, names)
             what = f"the start of the recording has {name!r}, the model has not{hint}"
@@ -161,9 +183,43 @@ def _require_consistent(model: NetworkModel, recordings: Sequence[Recording]) ->
         raise InputError("the model has no outputs", "name the quantities that were measured")
     if not recordings:
         raise InputError("there is no recording", "give at least one")
+    _require_held_ends(model)
     if model.start.speeds or model.start.locked:
         return
     raise InputError("the model has no start", "state speeds by node, as first guesses")
+
+
+def _require_held_ends(model: NetworkModel) -> None:
+    """Raise InputError for a node that an end of one element has alone, and that is not measured:
+    no torque passes there."""
+    ends = [
+        (f"{one['name']}.{port}", node)
+        for one in model.elements
+        if len(ports := list_ports(one)) > 1
+        for port, node in ports.items()
+    ]
+    at = Counter(node for one in model.elements for node in set(list_ports(one).values()))
+    measured = [name for kind, name in model.outputs.values() if kind == "speed"]
+    others = [node for node, count in at.items() if count > 1]
+    for path, node in ends:
+        if at[node] == 1 and node != GROUND and node not in measured:
+            what = f"{path}: no other element is at the node {node!r}"
+            hint = suggest_spelling(node, others)
+            raise InputError(what + hint, "connect the end, or leave the element out")
+
+
+def _require_used(model: NetworkModel, recording: Recording) -> None:
+    """Raise InputError for a channel of the recording that the fit would ignore."""
+    used = [name for one in model.elements for name in list_inputs(one)]
+    tables = (
+        ("inputs", recording.inputs, dict.fromkeys(used), "no element takes this input"),
+        ("outputs", recording.outputs, model.outputs, "the model has no quantity for this output"),
+    )
+    for table, given, known, why in tables:
+        for name in given:
+            if name not in known:
+                what = f"{table}.{name}: {why}{suggest_spelling(name, known)}"
+                raise InputError(what, "correct the name, or leave it out of the recording")
 
 
 def _require_inputs(model: NetworkModel, recording: Recording) -> None:

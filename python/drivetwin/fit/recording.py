@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import estimate_rounding_step
@@ -14,11 +15,11 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import (
-    smooth_local_cubic,
-    smooth_pressure,
+    select_windows,
+    smooth_windows,
 )
 from drivetwin.estimation.likelihood.data.output import ComparedOutputs, Output
-from drivetwin.estimation.likelihood.data.shift_record import RECORD, fill_grid
+from drivetwin.estimation.likelihood.data.shift_record import RECORD, average_at_samples, fill_grid
 from drivetwin.simulation.dual_clutch import Signal
 
 _MIN_SAMPLES = 20
@@ -72,8 +73,9 @@ class NetworkRecord(ComparedOutputs):
     """Recording made ready for a fit.
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
-    `inputs` drive the simulation: the values as read less `held_back`, of which `fast` lies above
-    the band of the actuators; `input_sigma` is the white noise of their samples.
+    `inputs` drive the simulation: the values as read less `held_back`, of which `fast` is the part
+    that local cubics over `windows` samples take off; `input_sigma` is the white noise of their
+    samples.
     """
 
     time: FloatArray
@@ -82,6 +84,7 @@ class NetworkRecord(ComparedOutputs):
     input_sigma: Mapping[str, float]
     held_back: Mapping[str, FloatArray]
     fast: Mapping[str, FloatArray]
+    windows: Mapping[str, NDArray[np.intp]]
 
     def sample(self, columns: Mapping[str, FloatArray]) -> FloatArray:
         """Sample quantities (N,) or (N, p) on the grid, by name; (size,) or (size, p)."""
@@ -111,32 +114,28 @@ class NetworkRecord(ComparedOutputs):
             inputs[name] = _average_blocks(signal, size)
             sigma[name] = self.input_sigma[name] / float(np.sqrt(size))
             held_back[name] = np.zeros(inputs[name].values.size)
-        return NetworkRecord(time, outputs, inputs, sigma, held_back, held_back)
+        windows = {name: np.ones(one.size, dtype=np.intp) for name, one in held_back.items()}
+        return NetworkRecord(time, outputs, inputs, sigma, held_back, held_back, windows)
 
     def subtract_noise(
         self, noise: Mapping[str, FloatArray], delays: Mapping[str, float]
     ) -> NetworkRecord:
         """Subtract the expected `noise` (N-1,) per step of the grid from the inputs as read, which
         act by their `delays` [s] later. It takes the place of what was expected before."""
-        middle = 0.5 * (self.time[1:] + self.time[:-1])
         inputs, held_back = dict(self.inputs), dict(self.held_back)
         for name, steps in noise.items():
             signal = self.inputs[name]
-            at = signal.time + delays[name]
-            inside = (at >= middle[0]) & (at <= middle[-1])
-            own = smooth_local_cubic(
-                signal.time, np.where(inside, np.interp(at, middle, steps), 0.0)
-            )
+            own = average_at_samples(self.time, steps, signal.time + delays[name])
+            own = smooth_windows(own, self.windows[name])
             read = signal.values + self.held_back[name]
             held_back[name] = self.fast[name] + own
             inputs[name] = replace(signal, values=read - held_back[name])
         return replace(self, inputs=inputs, held_back=held_back)
 
     def interpolate_held_back(self, delays: Mapping[str, float]) -> dict[str, FloatArray]:
-        """Compute the held-back part of each input (N-1,) in the middle of each step."""
-        middle = 0.5 * (self.time[1:] + self.time[:-1])
+        """Compute the held-back part of each input (N,) at the points of the grid."""
         return {
-            name: np.interp(middle, self.inputs[name].time + delays[name], values)
+            name: np.interp(self.time, self.inputs[name].time + delays[name], values)
             for name, values in self.held_back.items()
         }
 
@@ -197,10 +196,11 @@ def build_network_record(
         for name, one in compared.items()
     )
     sigma = {name: Measured(one.time, one.values).get_noise() for name, one in inputs.items()}
-    smooth = {
-        name: smooth_pressure(MeasuredSignal(one.time, one.values, sigma[name]))
+    windows = {
+        name: select_windows(MeasuredSignal(one.time, one.values, sigma[name]))
         for name, one in inputs.items()
     }
+    smooth = {name: smooth_windows(one.values, windows[name]) for name, one in inputs.items()}
     fast = {name: one.values - smooth[name] for name, one in inputs.items()}
     return NetworkRecord(
         time,
@@ -209,6 +209,7 @@ def build_network_record(
         sigma,
         fast,
         fast,
+        windows,
     )
 
 
@@ -217,7 +218,24 @@ def _require_channels(recording: Recording, outputs: Sequence[str]) -> None:
     if missing:
         known = ", ".join(recording.outputs)
         raise InputError(f"the recording has no {', '.join(missing)}", f"it has {known}")
+    for name in outputs:
+        _require_sound(name, recording.outputs[name])
     for name, one in recording.inputs.items():
         if one.time.size < 2 or not np.all(np.isfinite(one.values)):
             what = f"{name}: the input has {one.time.size} samples, or some that are no numbers"
             raise InputError(what, "fill the gaps of an input, or cut the recording")
+
+
+def _require_sound(name: str, one: Measured) -> None:
+    """Raise InputError for an output whose samples have no time each, or a noise that is none."""
+    count, stamps = np.shape(one.values), np.shape(one.time)
+    if count != stamps or len(stamps) != 1:
+        what = f"outputs.{name}: values of shape {count} at times of shape {stamps}"
+        raise InputError(what, "give one time for each value")
+    if not np.all(np.diff(one.time) > 0.0):  # False for times that are no numbers as well
+        place = int(np.argmin(np.diff(one.time) > 0.0)) + 1
+        what = f"outputs.{name}: the time of sample {place} is not later than the one before it"
+        raise InputError(what, "sort the samples, and leave out those that repeat a time")
+    if one.sigma is not None and not (np.isfinite(one.sigma) and one.sigma > 0.0):
+        what = f"outputs.{name}: the noise sigma is {one.sigma:g}"
+        raise InputError(what, "give a positive number, or leave it out to have it estimated")

@@ -45,6 +45,11 @@ class FitGateSettings:
     """Q per sample above which the model does not explain the recordings [-]."""
     largest_error: float = 5.0
     """Root mean square of the normalised residual of an output from which it is no chance [-]."""
+    valid_chi2: float = 1.1
+    """Q per sample, beyond its own scatter, above which a part of the recordings is unexplained, by
+    which values may be off [-]."""
+    scatter: float = 3.0
+    """Q per sample of a right model above 1, in its standard deviations, that is chance [-]."""
     least_fit: float = 50.0
     """Fit of an output [%] below which half of what moves is not explained."""
 
@@ -73,8 +78,13 @@ def find_doubts(
     terms: Sequence[NetworkTerm],
     fits: Sequence[Mapping[str, SignalFit]],
     failures: Sequence[Finding],
+    chi2: float,
 ) -> Iterator[Finding]:
-    """Find outputs of which the simulation explains less than half, beside the `failures`."""
+    """Find a residual above the noise, and outputs of which the simulation explains less than half,
+    beside the `failures`."""
+    chance = 1.0 + FIT_GATE.scatter * np.sqrt(2.0 / sum(term.record.size for term in terms))
+    if max(FIT_GATE.valid_chi2, chance) < chi2 <= FIT_GATE.plausible_chi2:
+        yield report(Code.RESIDUAL_ABOVE_NOISE, chi2=chi2)
     failed = {one.names["channel"] for one in failures if one.code is Code.SIMULATION_MISSES}
     for term, fit in zip(terms, fits, strict=True):
         where = f" of {term.label}" if term.label else ""
@@ -91,7 +101,9 @@ def judge_status(
     if failures:
         return ModelStatus.NOT_VALID
     weak = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
-    limited = any(one.severity is Severity.ERROR for one in findings)
+    limited = any(
+        one.severity is Severity.ERROR or one.code is Code.RESIDUAL_ABOVE_NOISE for one in findings
+    )
     limited |= any(one.verdict in weak for one in estimates.values())
     return ModelStatus.LIMITED if limited else ModelStatus.VALID
 
@@ -200,7 +212,7 @@ def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMi
         intervals[one.name] = (one.to_value(float(ends[0])), one.to_value(float(ends[1])))
     agreement = tuple(term.compare(minimum.point) for term in problem.terms)
     failures = tuple(find_failures(problem.terms, minimum.normal.residuals, agreement, chi2))
-    doubts = find_doubts(problem.terms, agreement, failures)
+    doubts = find_doubts(problem.terms, agreement, failures, chi2)
     findings = (*failures, *doubts, *_collect_findings(minimum, sought))
     estimates = apply_errors(estimates, findings)
     return ModelFit(

@@ -12,6 +12,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
+from drivetwin.estimation.likelihood.data.output import Output as ComparedOutput
 from drivetwin.estimation.likelihood.noise.residual_covariance import (
     InputNoise,
     LinearResponse,
@@ -216,16 +217,33 @@ class NetworkTerm:
         if not response.finite:
             return None
         rows = {name: found.rows[output] for name, output in self.plant.outputs.items()}
-        seen = [SeenOutput(rows[out.name], out.centre, out.sigma) for out in record.outputs]
         power = self._compute_power(response)
+        direct = {  # derivatives (N,) by prescribed speeds
+            name: {of: np.einsum("ks,ks->k", row, one) for of, one in found.offset.items()}
+            for name, row in rows.items()
+        }
+        seen = [
+            SeenOutput(rows[out.name], out.centre, _add_direct_noise(out, direct[out.name], power))
+            for out in record.outputs
+        ]
+        quiet = _compute_quiet_noise(response, seen)
         try:
-            noise = InputNoise(seen, power, _compute_quiet_noise(response, seen))
-            weighting = add_input_noise(record.sigma, response, noise)
+            sigma = np.concatenate([one.sigma for one in seen])
+            weighting = add_input_noise(sigma, response, InputNoise(seen, power, quiet))
         except np.linalg.LinAlgError:
             return None
-        held_back = record.interpolate_held_back(self._get_delays(point))
+        at_points = record.interpolate_held_back(self._get_delays(point))
+        held_back = {
+            # An offset of the state acts from the start of a step on.
+            name: values[:-1] if name in found.offset else 0.5 * (values[1:] + values[:-1])
+            for name, values in at_points.items()
+        }
         z = response.propagate_inputs({name: held_back[name] for name in drive})
-        columns = {name: np.einsum("ks,ks->k", row, z) for name, row in rows.items()}
+        columns = {
+            name: np.einsum("ks,ks->k", row, z)
+            + sum(own * at_points[of] for of, own in direct[name].items())
+            for name, row in rows.items()
+        }
         return replace(self, weighting=weighting, returned=record.sample(columns))
 
     def _compute_response(self, point: ParameterVector) -> NetworkResponse | None:
@@ -251,6 +269,18 @@ class NetworkTerm:
         return {name: float(one.delay) for name, one in inputs.items() if isinstance(one, Signal)}
 
 
+def _add_direct_noise(
+    out: ComparedOutput, direct: Mapping[str, FloatArray], power: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Compute the noise (n,) of the samples of an output: of its sensor, and of the inputs of which
+    it is a function without delay."""
+    variance = np.full(out.values.size, out.sigma**2)
+    for name, slope in direct.items():
+        of_input = np.append(power[name], power[name][-1:])
+        variance += (slope**2 * of_input)[out.centre]
+    return np.sqrt(variance)
+
+
 def _compute_quiet_noise(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:
     """Compute the change (S,) of each state that an output shows by the noise of its sensor.
 
@@ -266,7 +296,7 @@ def _compute_quiet_noise(response: LinearResponse, outputs: Sequence[SeenOutput]
     shown = np.zeros((places.size, states))
     for out in outputs:
         effect = np.einsum("...s,...sq->...q", out.get_rows(), z[out.centre])
-        largest = np.max(np.abs(effect), axis=0) / out.sigma
+        largest = np.max(np.abs(effect), axis=0) / np.min(out.sigma)
         shown = np.maximum(shown, largest.reshape(places.size, states))
     usual = np.median(shown, axis=0)
     return np.where(usual > 0.0, 1.0 / np.where(usual > 0.0, usual, 1.0), 1.0)

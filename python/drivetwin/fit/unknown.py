@@ -203,6 +203,17 @@ def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> ElementFiel
     return found
 
 
+def require_distinct_places(sought: Iterable[SoughtNumber]) -> None:
+    """Raise InputError for a number that two unknowns set."""
+    owners: dict[str, str] = {}
+    for one in sought:
+        for path in one.factors:
+            if path in owners:
+                what = f"{path}: set by the unknowns {owners[path]!r} and {one.name!r}"
+                raise InputError(what, "leave the path to one of them")
+            owners[path] = one.name
+
+
 def require_known_places(
     sought: Iterable[SoughtNumber], starts: Collection[str], inputs: Collection[str]
 ) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from drivetwin.simulation.network import (
     Sine,
     Start,
     resolve_outputs,
+    simulate,
     to_core_sines,
 )
 from drivetwin.simulation.serialize import as_json
@@ -38,12 +39,14 @@ class NetworkResponse:
     `transition` (N-1, S, S) takes a disturbance of the state from one instant to the next, through
     all events between them. `drive` (N-1, S) by input is the change of the state by a disturbance
     that is constant over the step. `rows` (N, S) by output is its derivative by the state; the last
-    instant has that of the step before it.
+    instant has that of the step before it. A prescribed speed is a part of the state: `offset`
+    (N, S) by its input is the state's derivative by it, and its drive is the change of the rest.
     """
 
     transition: FloatArray
     drive: Mapping[str, FloatArray]
     rows: Mapping[Output, FloatArray]
+    offset: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def compute_response(
@@ -80,6 +83,85 @@ def compute_response(
     if integrals:
         what = f"{integrals[0]!r} is an integral over the run, no function of the state"
         raise InputError(what, "leave it out of the outputs of a response")
+    found = _respond(elements, inputs, start, time, outputs, accuracy)
+    names = _list_speed_inputs(elements, inputs)
+    if found is None or not names:
+        return found
+    driven, torques = _drive_by_torques(elements, inputs, names)
+    began = _find_start(elements, inputs, start, time)
+    heavy = _respond(driven, torques, began, time, [], accuracy)
+    if heavy is None:
+        return None
+    drive, offset = dict(found.drive), {}
+    for name in names:
+        ends = _FLYWHEEL * heavy.drive[name] / np.diff(time)[:, None]
+        offset[name] = np.concatenate([ends[:1], ends])
+        moved = np.einsum("kij,kj->ki", found.transition, offset[name][:-1])
+        drive[name] = drive[name] + moved - ends
+    return replace(found, drive=drive, offset=offset)
+
+
+_FLYWHEEL = 1e8
+"""Inertia that no driveline accelerates noticeably; that of a truck is 1e4 [kg·m²]."""
+
+
+def _list_speed_inputs(
+    elements: Sequence[Element], inputs: Mapping[str, Signal | Sine]
+) -> list[str]:
+    """List the sampled inputs that prescribe speeds."""
+    prescribed = [str(one["input"]) for one in elements if one["type"] == "prescribed_speed"]
+    return [name for name in dict.fromkeys(prescribed) if isinstance(inputs[name], Signal)]
+
+
+def _find_start(
+    elements: Sequence[Element],
+    inputs: Mapping[str, Signal | Sine],
+    start: Start,
+    time: FloatArray,
+) -> Start:
+    """Find the start that prescribed speeds lead to, with the speeds of their nodes."""
+    nodes = [str(one["node"]) for one in elements if one["type"] == "prescribed_speed"]
+    outputs: list[Output] = [("speed", name) for name in dict.fromkeys([*start.speeds, *nodes])]
+    run = simulate(elements, inputs, start, time[:2], outputs)
+    return replace(
+        start, speeds={name: float(run.columns[kind, name][0]) for kind, name in outputs}
+    )
+
+
+def _drive_by_torques(
+    elements: Sequence[Element], inputs: Mapping[str, Signal | Sine], names: Sequence[str]
+) -> tuple[list[Element], dict[str, Signal | Sine]]:
+    """Replace the prescribed speeds of the inputs `names` by flywheels whose torques make them.
+
+    The impulse of such a torque is an offset of the speed, with all that is locked to it.
+    """
+    driven: list[Element] = []
+    for one in elements:
+        if one["type"] != "prescribed_speed" or one["input"] not in names:
+            driven.append(one)
+            continue
+        wheel = {"type": "inertia", "node": one["node"], "inertia": _FLYWHEEL}
+        torque = {"type": "torque", "node": one["node"], "input": one["input"]}
+        driven += [{**wheel, "name": one["name"]}, {**torque, "name": f"{one['name']} torque"}]
+    torques = dict(inputs)
+    for name in names:
+        signal = inputs[name]
+        assert isinstance(signal, Signal)
+        rate = np.diff(signal.values) / np.diff(signal.time)
+        values = np.pad(np.repeat(_FLYWHEEL * rate, 2), 1)
+        torques[name] = replace(signal, time=np.repeat(signal.time, 2), values=values)
+    return driven, torques
+
+
+def _respond(
+    elements: Sequence[Element],
+    inputs: Mapping[str, Signal | Sine],
+    start: Start,
+    time: FloatArray,
+    outputs: Sequence[Output],
+    accuracy: Accuracy,
+) -> NetworkResponse | None:
+    """Compute the response by the core; an offset of a prescribed speed changes nothing in it."""
     requests = resolve_outputs(elements, inputs, outputs)
     sampled = {name: one for name, one in inputs.items() if isinstance(one, Signal)}
     scenario = ((to_delayed_core_samples(sampled), to_core_sines(inputs)), start.to_core())

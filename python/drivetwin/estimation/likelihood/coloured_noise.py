@@ -45,7 +45,8 @@ def split_whitened(term: Term, residual: FloatArray) -> Iterator[tuple[Output, s
     the sensor's noise, input noise taken out. Of a right model that is white, of variance 1, or
     less at frequencies at which input noise explains a part of it.
     """
-    white = (residual - term.weighting.estimate_input_share(residual)) / term.record.sigma
+    white = residual - term.weighting.estimate_input_share(residual)
+    white = white / term.weighting.sigma
     first = 0
     for out in term.record.outputs:
         rows = slice(first, first + out.values.size)
@@ -83,7 +84,7 @@ def compute_long_run_excess(
         for out, rows, white in split_whitened(term, residual):
             excess = compute_slow_power(term, out, rows, white) - counted
             if excess > 0.0:
-                columns = out.sigma * part[rows]
+                columns = term.weighting.sigma[rows, None] * part[rows]
                 found[np.ix_(acting, acting)] += excess * columns.T @ columns
     return found
 
@@ -117,7 +118,7 @@ def _by_probes(term: Term, rows: slice, size: int) -> tuple[float, float]:
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(count, COLOURED_NOISE.probes))
     probes = np.zeros((term.record.size, COLOURED_NOISE.probes))
     probes[held] = np.repeat(signs, size, axis=0) / np.sqrt(size)
-    sigma = term.record.sigma[:, None]
+    sigma = term.weighting.sigma[:, None]
     left = (probes - term.weighting.estimate_input_share(sigma * probes) / sigma)[held]
     means = left.reshape(count, size, COLOURED_NOISE.probes).sum(axis=1) / np.sqrt(size)
     return float(np.mean(signs * means)), float(np.mean(means**2))

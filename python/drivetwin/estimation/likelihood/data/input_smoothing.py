@@ -11,6 +11,7 @@ off a pressure that stays or goes evenly.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,12 @@ class InputSmoothingSettings:
     """Half width of the interval of the middle of a cubic, in its standard deviations: the
     intervals of all shorter cubics must overlap. Narrower than that of means, because a cut corner
     opens the element elsewhere [-]."""
+    least_samples: int = 13
+    """Samples of the shortest cubic of an input whose delay may be sought, odd: it leaves 42 % of
+    the noise, and 2 % of the power of its differences [count]."""
+    window_sigma: float = 3.0
+    """As `cubic_sigma`, for any input: linear propagation returns the effect of a corner that is
+    cut, so noise is the greater harm [-]."""
     fill_sigma: float = 3.0
     """Distance from P0, in the noise of a sample, within which noise may open or close the element
     [-]."""
@@ -59,36 +66,67 @@ def smooth_pressure(pressure: MeasuredSignal, fill: PriorValue | None = None) ->
     smooth = smooth_local_cubic(pressure.time, pressure.values)
     apart = np.abs(pressure.values - smooth) > SMOOTHING.corner_sigma * pressure.sigma
     if fill is not None:
-        steady = _select_steady(pressure, smooth)
+        steady = _select_steady(pressure)
         band = SMOOTHING.fill_sigma * pressure.sigma + 2.0 * fill.std
         smooth = np.where(np.abs(steady - fill.value) < band, steady, smooth)
     return np.where(_spread(apart, _count_samples(pressure.time)), pressure.values, smooth)
 
 
-def _select_steady(pressure: MeasuredSignal, smooth: FloatArray) -> FloatArray:
+def _select_steady(pressure: MeasuredSignal) -> FloatArray:
     """Compute the middle (n,) of the longest cubic about each sample that agrees with all shorter
-    ones and with `smooth`, that over `SMOOTHING.window` (as `smooth_adaptive`).
+    ones, that over `SMOOTHING.window` the shortest.
 
     Pressure noise about P0 gives the fit many minima. In each of them the noise switches the torque
     on and off, which is mistaken for information that separates P0 from μ. At 5 kPa above P0 an
     estimate may be four standard deviations off.
     """
-    values, steady = pressure.values, smooth
-    margin = (
-        SMOOTHING.cubic_sigma * pressure.sigma * _compute_noise_gain(_count_samples(pressure.time))
-    )
-    low, high = smooth - margin, smooth + margin
-    open_ = np.ones(values.size, dtype=bool)
-    for window in SMOOTHING.longer_windows:
-        size = _count_samples(pressure.time, window)
-        if not CUBIC + 1 < size <= values.size:
-            continue
-        trial = filter_local_cubic(values, size)
-        margin = SMOOTHING.cubic_sigma * pressure.sigma * _compute_noise_gain(size)
+    shortest = _count_samples(pressure.time)
+    sizes = [shortest, *_list_longer(pressure.time, shortest)]
+    return smooth_windows(pressure.values, _select_windows(pressure, sizes, SMOOTHING.cubic_sigma))
+
+
+def select_windows(signal: MeasuredSignal) -> NDArray[np.intp]:
+    """Select the number of samples (n,) of the cubic about each sample of any input, 1 at a corner.
+
+    Noise left on an input whose delay is sought enters the derivative by the delay, where it is
+    mistaken for information. A cubic takes off enough of it from `SMOOTHING.least_samples` on.
+    """
+    shortest = max(_count_samples(signal.time), SMOOTHING.least_samples)
+    sizes = [1, shortest, *_list_longer(signal.time, shortest)]
+    return _select_windows(signal, sizes, SMOOTHING.window_sigma)
+
+
+def smooth_windows(values: FloatArray, windows: NDArray[np.intp]) -> FloatArray:
+    """Return the middle of the cubic over so many samples as `windows` (n,) has about each of
+    `values` (n,)."""
+    smooth = values.copy()
+    for size in np.unique(windows[windows > CUBIC + 1]):
+        inside = windows == size
+        smooth[inside] = filter_local_cubic(values, int(size))[inside]
+    return smooth
+
+
+def _list_longer(time: FloatArray, shortest: int) -> list[int]:
+    """List the numbers of samples of the longer windows, beyond the `shortest`."""
+    every = [_count_samples(time, window) for window in SMOOTHING.longer_windows]
+    return [size for size in every if size > max(shortest, CUBIC + 1)]
+
+
+def _select_windows(signal: MeasuredSignal, sizes: Sequence[int], sigma: float) -> NDArray[np.intp]:
+    """Select about each sample (n,) the longest cubic of increasing `sizes` whose interval of
+    `sigma` overlaps those of all shorter ones (as `smooth_adaptive`)."""
+    values = signal.values
+    low, high = np.full(values.size, -np.inf), np.full(values.size, np.inf)
+    windows, open_ = np.ones(values.size, dtype=np.intp), np.ones(values.size, dtype=bool)
+    for size in sizes:
+        if size > values.size:
+            break
+        trial = smooth_windows(values, np.full(values.size, size))
+        margin = sigma * signal.sigma * _compute_noise_gain(size)
         low, high = np.maximum(low, trial - margin), np.minimum(high, trial + margin)
         open_ &= low <= high
-        steady = np.where(open_, trial, steady)
-    return np.asarray(steady)
+        windows = np.where(open_, size, windows)
+    return windows
 
 
 def _compute_noise_gain(size: int) -> float:

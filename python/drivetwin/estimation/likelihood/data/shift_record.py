@@ -178,10 +178,10 @@ class ShiftRecord(ComparedOutputs):
         passes the local cubic still drives the run.
         """
         torque = self.engine_torque
-        own = {TORQUE: _average_at_samples(self.time, noise[TORQUE], torque.time - delay)}
+        own = {TORQUE: average_at_samples(self.time, noise[TORQUE], torque.time - delay)}
         for name, p in self.pressures.items():
             own[name] = smooth_local_cubic(
-                p.time, _average_at_samples(self.time, noise[name], p.time)
+                p.time, average_at_samples(self.time, noise[name], p.time)
             )
         held = {name: self.fast.get(name, 0.0) + values for name, values in own.items()}
         driving = {
@@ -367,7 +367,7 @@ def fill_grid(time: FloatArray, step: float = RECORD.grid_step) -> FloatArray:
     return np.sort(np.concatenate([time, *steps]))
 
 
-def _average_at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
+def average_at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
     """Compute the noise of samples at `stamps` (m,) from that over each step of `grid` (N-1,).
 
     A sample acts on the steps about it as interpolation has it; its expected noise is their mean

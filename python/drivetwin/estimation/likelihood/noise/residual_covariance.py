@@ -123,11 +123,11 @@ RESIDUAL_COVARIANCE = ResidualCovarianceSettings()
 @dataclass(frozen=True, eq=False)
 class SeenOutput:
     """Samples of one output: its `row` (S,) or (N, S) over the states, the points `centre` (n,) of
-    the grid in the middle of what the samples show, and the noise of its sensor."""
+    the grid in the middle of what the samples show, and their noise `sigma`, one or (n,)."""
 
     row: FloatArray
     centre: NDArray[np.intp]
-    sigma: float
+    sigma: float | FloatArray
 
     def get_rows(self) -> FloatArray:
         """Return the row of each sample (n, S)."""
@@ -204,6 +204,11 @@ class Whitener:
 
     variance: FloatArray
     path: NoisePath | None = None
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Noise of each sample (n,) without that which the state carries."""
+        return np.sqrt(self.variance)
 
     @property
     def log_determinant(self) -> float:
@@ -321,7 +326,8 @@ def _build_information(
     diagonal = inverse.copy()
     diagonal[:-1] += transition.transpose(0, 2, 1) @ through
     for out in outputs:
-        seen = np.bincount(out.centre, minlength=count) / out.sigma**2
+        weights = np.broadcast_to(1.0 / np.square(out.sigma), out.centre.shape)
+        seen = np.bincount(out.centre, weights, minlength=count)
         diagonal += seen[:, None, None] * (out.row[..., :, None] * out.row[..., None, :])
     banded = np.zeros((2 * states, states * count))
     for i in range(states):
