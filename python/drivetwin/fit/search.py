@@ -232,6 +232,9 @@ class _Screen:
             draws = np.array([self._draw_prior(one) for one in self.sought]).T
         else:
             draws = self._draw_about_best(number)
+        for k, one in enumerate(self.sought):
+            if any(path.startswith("delay.") for path in one.factors):
+                draws[:, k] = one.start  # one delay for all runs side by side
         scores = np.zeros(len(draws))
         for term in self.problem.terms:
             scores += _compute_scores(term, self.start, self.sought, draws)

@@ -39,9 +39,6 @@ class InputSmoothingSettings:
     least_samples: int = 13
     """Samples of the shortest cubic of an input whose delay may be sought, odd: it leaves 42 % of
     the noise, and 2 % of the power of its differences [count]."""
-    window_sigma: float = 3.0
-    """As `cubic_sigma`, for any input: linear propagation returns the effect of a corner that is
-    cut, so noise is the greater harm [-]."""
     fill_sigma: float = 3.0
     """Distance from P0, in the noise of a sample, within which noise may open or close the element
     [-]."""
@@ -52,7 +49,8 @@ class InputSmoothingSettings:
     half_widths: tuple[int, ...] = (0, 1, 2, 4, 8, 16, 32, 64)
     """Windows of the local mean: samples to either side [-]."""
     mean_sigma: float = 2.5
-    """Half width of the interval of a mean, in its standard deviations [-]."""
+    """Half width of the interval of a mean, in its standard deviations; of a cubic where the effect
+    of a corner that it cuts is returned linearly (`select_windows`) [-]."""
 
 
 SMOOTHING = InputSmoothingSettings()
@@ -88,12 +86,13 @@ def _select_steady(pressure: MeasuredSignal) -> FloatArray:
 def select_windows(signal: MeasuredSignal) -> NDArray[np.intp]:
     """Select the number of samples (n,) of the cubic about each sample of any input, 1 at a corner.
 
-    Noise left on an input whose delay is sought enters the derivative by the delay, where it is
-    mistaken for information. A cubic takes off enough of it from `SMOOTHING.least_samples` on.
+    Every level is treated as one at P0, because any element may have its kink there. Noise that is
+    left on an input enters the derivative by its delay, where it is mistaken for information. A
+    cubic takes off enough of it from `SMOOTHING.least_samples` on.
     """
     shortest = max(_count_samples(signal.time), SMOOTHING.least_samples)
     sizes = [1, shortest, *_list_longer(signal.time, shortest)]
-    return _select_windows(signal, sizes, SMOOTHING.window_sigma)
+    return _select_windows(signal, sizes, SMOOTHING.mean_sigma)
 
 
 def smooth_windows(values: FloatArray, windows: NDArray[np.intp]) -> FloatArray:
