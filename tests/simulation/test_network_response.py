@@ -93,3 +93,41 @@ def test_a_wrong_description_is_refused() -> None:
 def test_an_integral_over_the_run_has_no_response() -> None:
     with pytest.raises(InputError, match=r"'angle'.* is an integral"):
         compute_response(ELEMENTS, INPUTS, START, TIME, [("angle", "a")])
+
+
+def test_a_prescribed_speed_is_an_offset_of_the_state_and_of_what_is_locked_to_it() -> None:
+    """The clutch locks the shaft to the prescribed speed; another speed of it is that of both."""
+    elements = [
+        build_element("prescribed_speed", "drive", node="a", input="w"),
+        build_element("inertia", "rotor", node="a", inertia=2.0),
+        build_element("clutch", "clutch", a="a", b="b", gain=1.0, p0=0.0, peak=1.0,
+            friction={"mu_c": 0.1, "mu_s": 0.1, "v_s": 5.0, "mu_v": 0.0}, pressure="P",
+            drum_inertia=0.0),
+        build_element("inertia", "hub", node="b", inertia=0.5),
+        build_element("spring_damper", "shaft", a="b", b="c", stiffness=200.0, damping=1.5),
+        build_element("inertia", "wheel", node="c", inertia=3.0),
+    ]  # fmt: skip
+    speed = 20.0 + 3.0 * np.sin(2.0 * TIME)
+    pressure = Signal(np.array([0.0, 0.5, 2.0]), np.array([400.0, 4000.0, 4000.0]))
+    outputs: list[Output] = [("speed", "b"), ("speed", "c"), ("shaft_torque", "shaft")]
+    start = Start({"b": 12.0, "c": 12.0}, {"shaft": 0.0})
+    noise = np.random.default_rng(0).standard_normal(TIME.size)
+
+    def move(size: float) -> NetworkRun:
+        inputs = {"w": Signal(TIME, speed + size * noise), "P": pressure}
+        return simulate(elements, inputs, start, TIME, outputs, accuracy=EXACT)
+
+    above, below = move(1e-4), move(-1e-4)
+    assert [event.kind for event in above.events] == ["lock"]
+    inputs = {"w": Signal(TIME, speed), "P": pressure}
+    found = compute_response(elements, inputs, start, TIME, outputs, accuracy=EXACT)
+    assert found is not None
+    response = LinearResponse(np.diff(TIME), found.transition, found.drive)
+    state = (
+        response.propagate_inputs({"w": 0.5 * (noise[1:] + noise[:-1])})
+        + found.offset["w"] * noise[:, None]
+    )
+    for output in outputs:
+        expected = (above.columns[output] - below.columns[output]) / 2e-4
+        shown = np.einsum("ks,ks->k", found.rows[output], state)
+        assert np.std(shown - expected) < 0.02 * np.std(expected), output

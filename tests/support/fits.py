@@ -41,7 +41,11 @@ class MadeLog:
 @cache
 def make_log(name: ModelName, seed: int = 0) -> MadeLog:
     """Make a log of a built-in model and read it."""
-    texts = synthesize_log(*read_builtin(name), seed)
+    return read_log(synthesize_log(*read_builtin(name), seed))
+
+
+def read_log(texts: SynthesizedLog) -> MadeLog:
+    """Read a synthesised log with its model."""
     with TemporaryDirectory() as folder:
         log, model = Path(folder, "log.csv"), Path(folder, "log.model.toml")
         log.write_text(texts.log, encoding="utf-8")

@@ -219,7 +219,11 @@ class NetworkTerm:
         rows = {name: found.rows[output] for name, output in self.plant.outputs.items()}
         power = self._compute_power(response)
         direct = {  # derivatives (N,) by prescribed speeds
-            name: {of: np.einsum("ks,ks->k", row, one) for of, one in found.offset.items()}
+            name: {
+                of: np.einsum("ks,ks->k", row, one)
+                for of, one in found.offset.items()
+                if of in drive
+            }
             for name, row in rows.items()
         }
         seen = [
@@ -233,12 +237,8 @@ class NetworkTerm:
         except np.linalg.LinAlgError:
             return None
         at_points = record.interpolate_held_back(self._get_delays(point))
-        held_back = {
-            # An offset of the state acts from the start of a step on.
-            name: values[:-1] if name in found.offset else 0.5 * (values[1:] + values[:-1])
-            for name, values in at_points.items()
-        }
-        z = response.propagate_inputs({name: held_back[name] for name in drive})
+        held_back = {name: 0.5 * (at_points[name][1:] + at_points[name][:-1]) for name in drive}
+        z = response.propagate_inputs(held_back)
         columns = {
             name: np.einsum("ks,ks->k", row, z)
             + sum(own * at_points[of] for of, own in direct[name].items())

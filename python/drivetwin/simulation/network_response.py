@@ -94,15 +94,23 @@ def compute_response(
         return None
     drive, offset = dict(found.drive), {}
     for name in names:
-        ends = _FLYWHEEL * heavy.drive[name] / np.diff(time)[:, None]
+        ramp = _FLYWHEEL * heavy.drive[_name_torque(name)] / np.diff(time)[:, None]
+        # What moves evenly over a step has answered by the mean of both its ends.
+        mean = 0.5 * (np.eye(ramp.shape[1]) + heavy.transition)
+        ends = np.linalg.solve(mean, ramp[:, :, None])[:, :, 0]
         offset[name] = np.concatenate([ends[:1], ends])
-        moved = np.einsum("kij,kj->ki", found.transition, offset[name][:-1])
-        drive[name] = drive[name] + moved - ends
+        moved = np.einsum("kij,kj->ki", heavy.transition, offset[name][:-1])
+        drive[name] = moved - ends + heavy.drive.get(name, 0.0)
     return replace(found, drive=drive, offset=offset)
 
 
 _FLYWHEEL = 1e8
 """Inertia that no driveline accelerates noticeably; that of a truck is 1e4 [kg·m²]."""
+
+
+def _name_torque(speed: str) -> str:
+    """Return the input of the torque that makes a prescribed speed."""
+    return f"torque of {speed}"
 
 
 def _list_speed_inputs(
@@ -141,7 +149,7 @@ def _drive_by_torques(
             driven.append(one)
             continue
         wheel = {"type": "inertia", "node": one["node"], "inertia": _FLYWHEEL}
-        torque = {"type": "torque", "node": one["node"], "input": one["input"]}
+        torque = {"type": "torque", "node": one["node"], "input": _name_torque(str(one["input"]))}
         driven += [{**wheel, "name": one["name"]}, {**torque, "name": f"{one['name']} torque"}]
     torques = dict(inputs)
     for name in names:
@@ -149,7 +157,7 @@ def _drive_by_torques(
         assert isinstance(signal, Signal)
         rate = np.diff(signal.values) / np.diff(signal.time)
         values = np.pad(np.repeat(_FLYWHEEL * rate, 2), 1)
-        torques[name] = replace(signal, time=np.repeat(signal.time, 2), values=values)
+        torques[_name_torque(name)] = replace(signal, time=np.repeat(signal.time, 2), values=values)
     return driven, torques
 
 
