@@ -278,7 +278,7 @@ def _add_direct_noise(
     for name, slope in direct.items():
         of_input = np.append(power[name], power[name][-1:])
         variance += (slope**2 * of_input)[out.centre]
-    return np.sqrt(variance)
+    return np.asarray(np.sqrt(variance))
 
 
 def _compute_quiet_noise(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:
