@@ -108,8 +108,8 @@ _TIME_NAMES = frozenset(
 def split_name_and_unit(cell: str) -> tuple[str, str | None]:
     """`EngTrq [Nm]` -> name and unit; round brackets count where they hold a unit.
 
-    `x[1]` without a blank is an index, part of the name. A time may have its unit behind `_`, as
-    `time_ms`.
+    `x[1]` without a blank is an index, part of the name. A time may have its unit behind
+    it, as `time_ms` or `t in ms`.
     """
     if match := re.fullmatch(r"(.+?)(\s*)\[([^\[\]]*)\]", cell):
         name, blank, inside = match.groups()
@@ -117,14 +117,35 @@ def split_name_and_unit(cell: str) -> tuple[str, str | None]:
             return name, inside.strip() or None
     if (match := re.fullmatch(r"(.+?)\s*\(([^()]*)\)", cell)) and is_unit(match[2]):
         return match[1], match[2].strip()
-    if (match := re.fullmatch(r"(.+)_([^\W\d_]+)", cell)) and is_time_unit(match[2]):
-        return (match[1], match[2]) if is_time_name(match[1]) else (cell, None)
+    match = re.fullmatch(r"(.+?)(?:[_.\- ]in)?[_.\- ]([^\W\d_]+)", cell)
+    if match and is_time_unit(match[2]) and is_time_name(match[1]):
+        return match[1], match[2]
     return cell, None
 
 
+_CLOCKS = ("devicetime", "localtime", "systemtime", "triptime", "gpstime", "utctime")
+"""Names of the clocks of a phone or logger, the best first: that of GPS counts whole seconds."""
+
+
 def is_time_name(name: str) -> bool:
-    """Return True if a column of this name is taken for time."""
-    return re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES
+    """Return True if a column of this name is taken for time; remarks in round brackets aside."""
+    return re.sub(r"[^a-z]", "", name.casefold()) in _TIME_NAMES or is_clock_name(name)
+
+
+def is_clock_name(name: str) -> bool:
+    """Return True for the name of a clock of a phone or logger, as `GPS Time`."""
+    return _strip_remarks(name) in _CLOCKS
+
+
+def _strip_remarks(name: str) -> str:
+    return re.sub(r"\([^()]*\)|[^a-z]", "", name.casefold())
+
+
+def rank_clocks(names: Sequence[str], found: Sequence[int]) -> list[int]:
+    """Return the time columns `found`, of several named after clocks the best first."""
+    if not all(is_clock_name(names[index]) for index in found):
+        return list(found)
+    return sorted(found, key=lambda index: _CLOCKS.index(_strip_remarks(names[index])))
 
 
 def can_be_time(unit: str | None) -> bool:
@@ -147,6 +168,8 @@ def find_time_indices(
         for index, (name, unit) in enumerate(zip(names, units, strict=True))
         if is_time_name(name) and can_be_time(unit)
     ]
+    plain = [index for index in named if not is_clock_name(names[index])]
+    named = plain or named
     timed = [index for index, unit in enumerate(units) if unit is not None and is_time_unit(unit)]
     return named or (timed if timed == [0] else [])
 

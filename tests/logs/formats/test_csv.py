@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from drivetwin.errors import (
     UnitError,
 )
 from drivetwin.logs.raw import RawLog
+from drivetwin.logs.read import read_raw
 from tests.logs.formats.text_logs import read_csv
 
 
@@ -409,3 +411,42 @@ def test_texts_of_two_states_are_a_flag(texts: tuple[str, str], values: list[flo
 def test_other_texts_are_no_flag(texts: tuple[str, str]) -> None:
     log = read(f"time [s],x,mode\n0,1,{texts[0]}\n1,2,{texts[1]}\n")
     assert [one.name for one in log.channels] == ["x"]
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ["0,000,1540,2,1642,1", "0,010,1540,3,1642,7", "0,020,1541,1,1640,2"],
+        ["0,1540,1642,1", "0,010,1540,1642,7", "0,020,1541,3,1640,2"],
+        ["0,1540,1642", "1,1540,1642", "2,1541,1640", "3,010,1541,1640"],
+    ],
+    ids=["all", "some", "a late one"],
+)
+def test_a_comma_for_columns_and_decimals_is_named(tmp_path: Path, rows: list[str]) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time,EngTrq,SpdIn", "s,Nm,rpm", *rows]) + "\n")
+    with pytest.raises(FileFormatError, match=r"line \d .*seems to be the decimal sign") as caught:
+        read_raw(path)
+    assert "semicolon" in caught.value.remedy
+
+
+@pytest.mark.parametrize("name", ["t_ms", "time_in_ms", "t.ms", "Trip Time(Since start)(ms)"])
+def test_the_unit_of_a_time_is_in_its_name(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(f"{name},EngTrq(actual)(Nm)\n0,1540\n10,1541\n20,1540\n")
+    (torque,) = read_raw(path).channels
+    assert (torque.name, torque.unit) == ("EngTrq(actual)", "Nm")
+    assert torque.time.tolist() == pytest.approx([0.0, 0.01, 0.02])
+
+
+def test_of_the_clocks_of_a_phone_the_fine_one_is_used(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    gps = "Wed Aug 05 18:57:56 GMT+01:00 2026"
+    rows = [f"{gps},05-Aug-2026 18:57:56.{k:03d},0.0,{1540 + k}" for k in range(0, 40, 10)]
+    head = "GPS Time, Device Time,Trip Time(Since journey start)(s),EngTrq(actual)(Nm)"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    raw = read_raw(path)
+    assert [one.name for one in raw.channels] == ["EngTrq(actual)"]
+    assert raw.channels[0].time.tolist() == pytest.approx([0.0, 0.01, 0.02, 0.03])
+    left = "Trip Time(Since journey start), GPS Time"
+    assert f"several time columns: Device Time is used, not {left}" in raw.warnings

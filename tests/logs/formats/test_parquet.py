@@ -179,3 +179,23 @@ def test_numbers_from_1970_count_from_the_first(tmp_path: Path) -> None:
     raw = read(tmp_path, table({"t": "us"}, t=stamps, x=T))
     assert raw.channels[0].time.tolist() == [0.0, 0.0005, 0.001, 0.0015]
     assert raw.warnings == ("time counts from the first stamp, 1763866345 s",)
+
+
+@pytest.mark.parametrize(("names", "used"), [(("local", "utc"), "utc"), (("local", "t"), "t")])
+def test_of_two_time_columns_one_is_used_and_the_other_named(
+    tmp_path: Path, names: tuple[str, str], used: str
+) -> None:
+    """A stamp without a time zone beside one with it, or beside a number [s]."""
+    path, ticks = tmp_path / "log.parquet", [0, 10, 20]
+    zoned = pa.array(ticks, pa.timestamp("ms", tz="UTC"))
+    table = {
+        names[0]: pa.array(ticks, pa.timestamp("ms")),
+        names[1]: zoned if used == "utc" else pa.array([0.0, 0.01, 0.02]),
+        "EngTrq [Nm]": pa.array([1.0, 2.0, 3.0]),
+    }
+    heads = ["t [s]" if one == "t" else one for one in table]
+    pq.write_table(pa.table(table).rename_columns(heads), path)
+    raw = read_raw(path)
+    assert [one.name for one in raw.channels] == ["EngTrq"]
+    assert raw.channels[0].time.tolist() == pytest.approx([0.0, 0.01, 0.02])
+    assert f"several time columns: {used} is used, not local" in raw.warnings

@@ -67,13 +67,18 @@ class ParquetRecording:
         schema = table.schema_arrow
         units = _parse_units(schema.metadata or {})
         columns = [_make_column(field, units) for field in schema]
-        time = self._find_time_index(columns, options)
-        self._fields = [index for index in range(len(columns)) if index != time]
+        time, others = self._find_time_index(columns, options)
+        self._fields = [index for index in range(len(columns)) if index not in (time, *others)]
         self.columns = tuple(columns[index] for index in self._fields)
         self._seconds = self._load_stamps(time, columns[time], options.time.unit)
 
-    def _find_time_index(self, columns: Sequence[Column], options: ReadOptions) -> int:
-        """The column with a name for time, else the only one whose type is a time."""
+    def _find_time_index(
+        self, columns: Sequence[Column], options: ReadOptions
+    ) -> tuple[int, Sequence[int]]:
+        """Return the time column, and others whose type is a time: they hold no channel.
+
+        It is the one with a name for time, else of those the first with a time zone, or the first.
+        """
         import pyarrow as pa
 
         names = [column.name for column in columns]
@@ -83,11 +88,17 @@ class ParquetRecording:
             for index, kind in enumerate(kinds)
             if pa.types.is_timestamp(kind) or pa.types.is_duration(kind) or pa.types.is_time(kind)
         ]
-        named = options.time.source is not None or any(map(is_time_name, names))
-        if not named and len(temporal) == 1:
-            return temporal[0]
-        units = [column.unit for column in columns]
-        return find_time_index(names, units, options.time, str(self._path))
+        if options.time.source is not None or any(map(is_time_name, names)) or not temporal:
+            units = [column.unit for column in columns]
+            found = find_time_index(names, units, options.time, str(self._path))
+        else:
+            zoned = (index for index in temporal if getattr(kinds[index], "tz", None))
+            found = next(zoned, temporal[0])
+        others = [index for index in temporal if index != found]
+        if others:
+            left = ", ".join(names[index] for index in others)
+            self.warnings = (f"several time columns: {names[found]} is used, not {left}",)
+        return found, others
 
     def load(self, index: int, window: Window | None = None) -> RawChannel:
         """Read one column; rows without a value are no samples. See `Recording`."""
@@ -141,7 +152,7 @@ class ParquetRecording:
             _refuse_missing_stamps(present, where)
             stamps = values * factor
         origin = find_origin(stamps[:1])
-        self.warnings = describe_origin(origin)
+        self.warnings = (*self.warnings, *describe_origin(origin))
         return subtract_origin(stamps, origin)
 
     def _load_ticks(self, field: int, where: Where) -> NDArray[np.int64]:

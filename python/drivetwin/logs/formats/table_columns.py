@@ -26,7 +26,9 @@ from drivetwin.channels.names import (
     can_be_time,
     find_time_index,
     find_time_indices,
+    is_clock_name,
     is_time_name,
+    rank_clocks,
     split_name_and_unit,
 )
 from drivetwin.channels.read_options import TimeColumn
@@ -97,13 +99,15 @@ def parse_table_columns(head: TableHead, time: TimeColumn, file: str) -> TableCo
 
 
 def _find_calendar(meant: Columns, head: TableHead, time: TimeColumn) -> tuple[int, ...]:
-    """Find the time columns of texts beside one of numbers.
+    """Find the time columns of texts beside one of numbers, and clocks beside a better one.
 
     A data frame with an index of dates keeps the time column that it had.
     """
     found = find_time_indices(meant.names, meant.units, time)
     if len(found) < 2 or not head.rows:
         return ()
+    if (ranked := rank_clocks(meant.names, found)) and is_clock_name(meant.names[ranked[0]]):
+        return tuple(ranked[1:])
     cells = head.rows[0].cells
     texts = tuple(k for k in found if k < len(cells) and is_time_text(cells[k]))
     return texts if len(texts) == len(found) - 1 else ()

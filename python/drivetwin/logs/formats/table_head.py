@@ -257,6 +257,17 @@ def _is_row(cells: Sequence[str]) -> bool:
     return len(cells) > 1 and is_value(next(filter(None, cells), ""))
 
 
+def make_width_error(
+    line: int, count: int, width: int, separator: str, file: str
+) -> FileFormatError:
+    """Return the error for a line with `count` fields below `width` names."""
+    what, remedy = f"line {line} has {count} fields, the names have {width}", EXPORT
+    if separator == "," and width < count <= 2 * width:
+        what += ": the comma separates the columns and seems to be the decimal sign as well"
+        remedy = "export with a semicolon or tab between the columns, or with a decimal point"
+    return FileFormatError(what, remedy, Where(file=file))
+
+
 class _TableLines:
     """The first lines of a file, split by one separator.
 
@@ -306,6 +317,7 @@ class _TableLines:
         if start is None:
             named = self._find_commented_names(lines)
             if not named:
+                self._refuse_commas(file)
                 raise FileFormatError(
                     f"line {self.lines[0].number} holds numbers in place of names",
                     EXPORT,
@@ -326,6 +338,14 @@ class _TableLines:
             self.lines[end:],
             first_row,
         )
+
+    def _refuse_commas(self, file: str) -> None:
+        """Raise FileFormatError where rows have more fields than names, two for each at most."""
+        above = (one for one in reversed(self.cells[: self.first]) if len(one) > 1)
+        names = next((one for one in above if not any(map(is_value, one))), ())
+        if self.first < len(self.lines) and len(names) < self.width <= 2 * len(names):
+            number = self.lines[self.first].number
+            raise make_width_error(number, self.width, len(names), self.separator, file)
 
     def _can_be_names(self, cells: Sequence[str]) -> bool:
         """Return True if a line has the usual width, but for a separator or remarks at its end."""

@@ -28,6 +28,7 @@ from drivetwin.logs.formats.table_head import (
     TableHead,
     TextFile,
     make_binary_error,
+    make_width_error,
     split_line,
 )
 
@@ -149,11 +150,8 @@ class TableReader:
         line, count = table.ragged
         cut = count < self.width and line == table.last_line and table.rows > 0
         if table.ragged_count > 1 or not cut:
-            raise FileFormatError(
-                f"line {line} has {count} fields, the names have {self.width}",
-                EXPORT,
-                Where(file=self.text.file),
-            )
+            separator, file = self.head.separator, self.text.file
+            raise make_width_error(line, count, self.width, separator, file)
         text = f"line {line}, the last, has {count} of {self.width} fields and is left out"
         return [f"the file is cut: {text}"]
 
