@@ -188,3 +188,16 @@ def test_a_command_is_optional(tmp_path: Path) -> None:
 def test_a_command_of_a_strange_element_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MappingError, match="'B7'"):
         read_arrays(columns(), card(tmp_path), UNITS, {"pressure_command.B7": "PrsBrk3"})
+
+
+def test_of_a_number_and_a_date_one_is_the_time_and_the_other_named() -> None:
+    time = np.arange(200) * 0.01
+    table = {
+        "time": time,
+        "timestamp": np.datetime64("2026-01-01") + (1e6 * time).astype("timedelta64[us]"),
+        "n_Abtrieb": 100.0 + time,
+    }
+    log = read_arrays(table, None, units={"n_Abtrieb": "rpm"}, needed=())
+    assert list(log.channels) == ["output_speed"]
+    told = [one.names.get("text") for one in log.findings]
+    assert "several time columns: time is used, not timestamp" in told

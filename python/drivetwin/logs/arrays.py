@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.channels.mapping import Mapped
-from drivetwin.channels.names import is_time_name
-from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.names import find_time_indices, rank_clocks
+from drivetwin.channels.read_options import ChannelSpec, TimeColumn
 from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import FileFormatError, Where
@@ -101,7 +101,9 @@ def _list_channels(
     if not isinstance(data, Mapping) and not hasattr(data, "columns"):
         return [_convert_signal(one, units, name) for one in _iterate_signals(data, name)], ()
     columns = list(data.columns if hasattr(data, "columns") else data)
-    times = [column for column in columns if is_time_name(str(column))]
+    named = [str(column) for column in columns]
+    found = find_time_indices(named, [None] * len(named), TimeColumn())
+    times = [columns[index] for index in rank_clocks(named, found)]
     if not times and not hasattr(data, "index"):
         raise FileFormatError(
             f"none of the {len(columns)} columns is a time by its name",
@@ -111,7 +113,10 @@ def _list_channels(
     stamps, label = (data[times[0]], str(times[0])) if times else (data.index, "index")
     stamps, remarks = _count_dates(stamps)
     time = _convert_to_numbers(stamps, label, name)
-    taken = [column for column in columns if column not in times[:1]]
+    if times[1:]:
+        left = ", ".join(map(str, times[1:]))
+        remarks = (f"several time columns: {times[0]} is used, not {left}", *remarks)
+    taken = [column for column in columns if column not in times]
     channels = [_make_channel(str(one), units.get(one), time, data[one], name) for one in taken]
     return channels, remarks
 
