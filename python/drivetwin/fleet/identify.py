@@ -20,6 +20,7 @@ from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.linear.friction_points import P0, evaluate_stribeck
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
@@ -67,14 +68,15 @@ def remove_friction_prior(
     posterior = _get_posterior(found, element)
     if posterior is None:
         return None
-    theta, covariance = posterior
+    theta, covariance, total = posterior
     mu, slopes = evaluate_stribeck(theta, np.array([slip]))
     to_pair = np.zeros((2, _LAW_SIZE + 1))
     to_pair[0, :_LAW_SIZE] = slopes[:, 0]
     to_pair[1, P0] = 1.0
     pair = np.array([float(mu[0]), theta[P0]])
     prior = card.elements[element].P0
-    freed = remove_prior(pair, to_pair @ covariance @ to_pair.T, 1, prior)
+    pairs = (to_pair @ one @ to_pair.T for one in (covariance, total))
+    freed = remove_prior(pair, next(pairs), 1, prior, next(pairs))
     if freed is None:
         return None
     values, spread = freed
@@ -82,19 +84,25 @@ def remove_friction_prior(
     return FreeFriction(float(values[0]), float(stds[0]), float(values[1]), float(stds[1]))
 
 
-def _get_posterior(found: Identification, element: str) -> tuple[FloatArray, FloatArray] | None:
-    """Friction law and P0 (5,) of an element, and their covariance, by either linear method."""
+def _get_posterior(
+    found: Identification, element: str
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Friction law and P0 (5,) of an element with two covariances: that of log and priors, and
+    the one widened by all else."""
     fit = found.evidence.likelihood
     if fit is not None:
         wanted = [f"{element}.{key}" for key in (*LAW, "P0")]
         if not set(wanted) <= set(fit.point.names):
             return None
         place = [fit.point.names.index(name) for name in wanted]
-        return fit.mean.values[place], fit.covariance[np.ix_(place, place)]
+        inverse = invert_information(fit.normal.information)
+        rows = np.ix_(place, place)
+        return fit.mean.values[place], inverse[rows], fit.covariance[rows]
     for shift in found.evidence.integral:
         if shift.friction is not None and shift.friction.element == element:
             size = _LAW_SIZE + 1
-            return shift.friction.fit.theta[:size], shift.friction.fit.covariance[:size, :size]
+            covariance = shift.friction.fit.covariance[:size, :size]
+            return shift.friction.fit.theta[:size], covariance, covariance
     return None
 
 

@@ -44,8 +44,9 @@ def _posterior(design: PriorValue) -> tuple[FloatArray, FloatArray]:
 
 
 def _found(design: PriorValue, sensors: float = 0.0) -> tuple[Contradiction, ...]:
-    systematic = {"J_out": sensors}
-    return find_contradictions(IDS, *_posterior(design), {"J_out": design}, systematic)
+    values, covariance = _posterior(design)
+    total = covariance + np.diag([sensors**2, 0.0, 0.0])
+    return find_contradictions(IDS, values, covariance, {"J_out": design}, total)
 
 
 @pytest.mark.parametrize("std", [0.02, 0.1, 0.3])
@@ -76,10 +77,10 @@ def test_an_estimate_that_is_off_the_card_although_it_is_as_wide_is_told() -> No
     design = PriorValue(1.35, 0.135)
     values, covariance = np.array([29.9]), np.array([[0.2**2]])
     assert remove_prior(values, covariance, 0, design) is None
-    (found,) = find_contradictions(("J_out",), values, covariance, {"J_out": design}, {})
+    (found,) = find_contradictions(("J_out",), values, covariance, {"J_out": design}, covariance)
     assert found.apart == pytest.approx((29.9 - 1.35) / 0.2)
     wide = np.array([[20.0**2]])
-    assert find_contradictions(("J_out",), values, wide, {"J_out": design}, {}) == ()
+    assert find_contradictions(("J_out",), values, wide, {"J_out": design}, wide) == ()
     estimates = {"J_out": from_prior("J_out", PriorValue(29.9, 0.2), Code.CARD_DOMINATES)}
     told = apply_contradictions(estimates, [found], "integral")["J_out"]
     assert (told.verdict, told.value, told.method) == (Verdict.WEAK, 29.9, "integral")
@@ -104,7 +105,8 @@ def test_an_exact_value_and_one_that_physics_excludes_are_judged_elsewhere() -> 
     nothing = np.array([[1e-4]])
     for value, std in ((1.2, 0.0), (-0.2, 0.1)):
         design = {"J_out": PriorValue(2.4, std)}
-        assert find_contradictions(("J_out",), np.array([value]), nothing, design, {}) == ()
+        values = np.array([value])
+        assert find_contradictions(("J_out",), values, nothing, design, nothing) == ()
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,18 @@ def test_an_entry_is_accused_by_all_that_is_uncertain() -> None:
     assert len(replace(FIT, total=FIT.covariance).conflicts) == 1
 
 
+def test_doubt_never_makes_an_accusation() -> None:
+    """A log with 1.8 deviations, in whose intervals effects leave as much doubt as the card."""
+    prior = DRIVELINE.find_prior("J_out")
+    log, std = prior.value - 1.8 * float(np.hypot(prior.std, 0.05)), 0.05
+    own = 1.0 / (std**-2 + prior.std**-2)
+    values = np.array([own * (log / std**2 + prior.value / prior.std**2), 1.5e5])
+    fit = replace(FIT, values=values, covariance=np.diag([own, 100.0**2]))
+    for doubt in (0.0, 0.5, 0.9, 0.95, 0.97):
+        wide = replace(fit, total=np.diag([max(own, (doubt * prior.std) ** 2), 100.0**2]))
+        assert wide.conflicts == ()
+
+
 def test_an_accusation_goes_with_the_values_that_carry_it() -> None:
     assert len(FIT.list_conflicts({"k_o"})) == 1
     assert FIT.list_conflicts({"J_out"}) == ()

@@ -20,6 +20,7 @@ from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.diagnostics.identifiability import (
     find_at_bounds,
     find_null_directions,
+    is_at_bound,
 )
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
@@ -176,7 +177,8 @@ def build_estimates(
     sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
     if sensors is not None and sensors.step.chi2 <= EXPLAINED:
         plain = _fit_parameters(fit, sensors, signals, drivelines, slips)
-        if _is_card_likelier(plain.fitted, corrected):
+        is_free = not is_at_bound(fit, sensors.mean.values)
+        if is_free and _is_card_likelier(plain.fitted, corrected):
             corrected, own, predicted = sensors, plain, sensors
             cause = find_cause(corrected, fit)
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
@@ -184,7 +186,8 @@ def build_estimates(
     ids = fitted.ids
     withdrawn = find_unreliable(corrected, ids, matrix, std)
     subjects = {one.subject for one in withdrawn}
-    conflicts = fitted.list_conflicts(subjects)
+    accuses = "" not in subjects and not is_at_bound(fit, corrected.mean.values)
+    conflicts = fitted.list_conflicts(subjects) if accuses else ()
     estimates = fitted.downgrade_conflicts(assess_friction(fitted.assess(), curves), conflicts)
     limits = [
         one
@@ -228,8 +231,8 @@ def build_estimates(
             *find_null_directions(fit),
             *report_different_loads(loads),
             *report_refined(fitted.priors, estimates),
-            *report_gains(curves, estimates),
-            *_check_levels(fit, corrected),
+            *(report_gains(curves, estimates) if accuses else ()),
+            *(_check_levels(fit, corrected) if accuses else ()),
             *_check_other_law(fit, signals, dict(zip(ids, matrix, strict=True))),
         ),
         _build_load_law(fit, corrected),
@@ -291,7 +294,7 @@ def _fit_parameters(
     fitted = FittedParameters(
         ids=tuple(values),
         values=np.array([*values.values()]),
-        covariance=matrix @ corrected.noise @ matrix.T,
+        covariance=matrix @ corrected.inverse @ matrix.T,
         std=noise,
         driveline=drivelines[0],
         systematic=dict(zip(values, np.sqrt(std**2 - noise**2).tolist(), strict=True)),

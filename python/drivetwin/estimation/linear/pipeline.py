@@ -232,10 +232,23 @@ def merge_shifts(
     ids, values, covariance = _merge_separate_loads(shifts) or _join_shifts(shifts)
     kept = [k for k, name in enumerate(ids) if name.split(".")[0] not in NUISANCES]
     ids, values = tuple(ids[k] for k in kept), values[kept]
+    covariance = covariance[np.ix_(kept, kept)]
+    priors = {name: prior for shift in shifts for name, prior in shift.priors.items()}
     wider = np.array(
-        [_estimate_scatter(name, value, shifts) for name, value in zip(ids, values, strict=True)]
+        [
+            _widen_data(_estimate_scatter(name, value, shifts), variance, priors.get(name))
+            for name, value, variance in zip(ids, values, np.diag(covariance), strict=True)
+        ]
     )
-    return ids, values, covariance[np.ix_(kept, kept)] * np.outer(wider, wider)
+    return ids, values, covariance * np.outer(wider, wider)
+
+
+def _widen_data(scatter: float, variance: float, prior: PriorValue | None) -> float:
+    """Factor on a standard deviation if the shifts scatter by a factor, but not the prior in it."""
+    if prior is None or not 0.0 < variance < prior.std**2:
+        return scatter
+    data = (1.0 / variance - prior.std**-2) / scatter**2
+    return float((variance * (data + prior.std**-2)) ** -0.5)
 
 
 def _estimate_scatter(name: str, value: float, shifts: Sequence[IntegralShift]) -> float:

@@ -84,11 +84,18 @@ def add_priors(
 
 
 def remove_prior(
-    values: FloatArray, covariance: FloatArray, k: int, prior: PriorValue
+    values: FloatArray,
+    covariance: FloatArray,
+    k: int,
+    prior: PriorValue,
+    total: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray] | None:
     """Values (q,) and covariance (q, q) with the normal `prior` of number k taken out.
 
-    None where the prior is exact or what is left would be next to nothing.
+    `covariance` is that of log and prior, before anything widens it. `total` (q, q) is the widened
+    one. The difference is propagated to the values without the prior: read as missing information
+    it would leave the more of the value to the prior, the wider it is. None where the prior is
+    exact or what is left would be next to nothing.
     """
     column, variance = covariance[:, k], float(covariance[k, k])
     if prior.std <= 0.0 or not np.isfinite(covariance).all() or variance <= 0.0:
@@ -97,6 +104,10 @@ def remove_prior(
     if left < PRIOR.min_information * prior.std**2:
         return None
     freed = covariance + np.outer(column, column) / left
+    if total is not None:
+        follow = np.eye(values.size)
+        follow[:, k] += column / left
+        freed = freed + follow @ (total - covariance) @ follow.T
     return values + column * ((values[k] - prior.value) / left), freed
 
 
@@ -128,32 +139,30 @@ def find_contradictions(
     values: FloatArray,
     covariance: FloatArray,
     designs: Mapping[str, PriorValue],
-    systematic: Mapping[str, float],
+    total: FloatArray,
 ) -> tuple[Contradiction, ...]:
-    """The `designs` by id that the estimates `values` (q,) with `covariance` (q, q) contradict.
+    """The `designs` by id that the estimates `values` (q,) contradict.
 
-    Each takes part in the estimates; `systematic` are the standard deviations of these from the
-    sensors' tolerances. Exact design values contradict nothing here.
+    Each takes part in the estimates. `covariance` (q, q) and `total` (q, q) are those of
+    `remove_prior`. Exact design values contradict nothing here.
     """
     found = []
     for name, design in designs.items():
-        k, sensors = ids.index(name), systematic.get(name, 0.0)
-        moved, spec = abs(float(values[k]) - design.value), get_parameter_spec(name)
+        k, spec = ids.index(name), get_parameter_spec(name)
         if is_ratio(name):  # an unknown that the log determines; `report_refined` compares it
             continue
         if design.std == 0.0 or not spec.lower <= values[k] <= spec.upper:
             continue
-        if moved <= design.std:  # no further off than the card allows, however sure the log is
-            continue
-        freed = remove_prior(values, covariance, k, design)
-        log = PriorValue(float(values[k]), float(np.sqrt(covariance[k, k])))
+        if abs(float(values[k]) - design.value) <= design.std:
+            continue  # no further off than the card allows, however sure the log is
+        freed = remove_prior(values, covariance, k, design, total)
+        log = PriorValue(float(values[k]), float(np.sqrt(total[k, k])))
         without: dict[str, float] = {}
-        spread = float(max(np.hypot(design.std, sensors), log.std))
+        spread = max(design.std, log.std)
         if freed is not None:
-            log = PriorValue(float(freed[0][k]), float(np.sqrt(freed[1][k, k])))
+            log = PriorValue(float(freed[0][k]), float(np.sqrt(max(freed[1][k, k], 0.0))))
             without = dict(zip(ids, freed[0].tolist(), strict=True))
-            alone = sensors * abs(log.value - design.value) / moved
-            spread = float(np.linalg.norm([design.std, log.std, alone]))
+            spread = float(np.hypot(design.std, log.std))
         apart = abs(log.value - design.value) / spread
         if apart > PRIOR.contradiction:
             found.append(Contradiction(name, design, log, apart, without))
@@ -252,12 +261,12 @@ def check_range(symbol: str, value: float, design: tuple[float, float]) -> list[
 
 @dataclass(frozen=True, eq=False)
 class FittedParameters:
-    """Parameters of a fit: `values` (q,) by id with `covariance` (q, q) and `std` (q,) from noise.
+    """Parameters of a fit: `values` (q,) by id with `std` (q,) from noise.
 
-    `systematic` are the standard deviations from sensor tolerances and effects by id, `notes`
-    findings by id. `method` names the estimator, `prior_method` that of parameters whose design
-    value took part. `total` (q, q) is the covariance with tolerances and effects; None where only
-    their standard deviations are known.
+    `covariance` (q, q) is that of log and priors, before anything widens it. `systematic` are the
+    standard deviations from sensor tolerances and effects by id, `notes` findings by id. `method`
+    names the estimator, `prior_method` that of parameters whose design value took part. `total`
+    (q, q) is the covariance with all that widens it; None where only `systematic` does.
     """
 
     ids: tuple[str, ...]
@@ -280,11 +289,11 @@ class FittedParameters:
     @cached_property
     def conflicts(self) -> tuple[Contradiction, ...]:
         """Design values that the log contradicts, by all that is uncertain."""
-        if self.total is not None:
-            return find_contradictions(self.ids, self.values, self.total, self.priors, {})
-        return find_contradictions(
-            self.ids, self.values, self.covariance, self.priors, self.systematic
-        )
+        total = self.total
+        if total is None:
+            errors = [self.systematic.get(name, 0.0) for name in self.ids]
+            total = self.covariance + np.diag(np.square(errors))
+        return find_contradictions(self.ids, self.values, self.covariance, self.priors, total)
 
     def assess(self) -> dict[str, Estimate]:
         """Return the estimates by id with the verdict of their intervals."""

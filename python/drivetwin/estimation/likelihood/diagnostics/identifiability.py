@@ -102,6 +102,16 @@ def find_at_bounds(fit: LikelihoodFit, ids: Sequence[str], slopes: FloatArray) -
     return found
 
 
+def is_at_bound(fit: LikelihoodFit, corrected: FloatArray) -> bool:
+    """Return whether an unknown is on a bound: at the minimum, or with its `corrected` value (p,).
+
+    The other unknowns then compensate for it, so that no entry of the card can be accused.
+    """
+    problem = fit.problem
+    clipped = (corrected <= problem.lower) | (corrected >= problem.upper)
+    return bool(np.any(np.logical_or(*locate_bounds(fit)) | clipped))
+
+
 def locate_bounds(fit: LikelihoodFit) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Locate the unknowns on their lower and upper bounds, both (p,)."""
     values, near = fit.point.values, BOUND_STD * np.sqrt(np.diag(fit.covariance))

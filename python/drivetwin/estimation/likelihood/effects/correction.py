@@ -73,7 +73,8 @@ class Correction:
     """Fit corrected for effects.
 
     `mean` are the corrected unknowns with `covariance` (p, p) (total) and `noise` (p, p), that of
-    noise alone. `step` is the last joint step, `spread` (p+q, p+q) what uncertain sizes of the
+    noise alone. `inverse` (p, p) is the inverse of their information, priors included, beside the
+    amounts that move them: nothing widens it. `step` is the last joint step, `spread` (p+q, p+q) what uncertain sizes of the
     effects add to its covariance; `last` (p,) the move of the unknowns between the last two steps,
     zero where one was enough. `evidence` is that of each group at the minimum of the fit.
     """
@@ -81,6 +82,7 @@ class Correction:
     mean: ParameterVector
     covariance: FloatArray
     noise: FloatArray
+    inverse: FloatArray
     step: JointStep
     spread: FloatArray
     last: FloatArray
@@ -120,6 +122,7 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     moves, amounts = step.moves, base.spread_amounts(step, shown)
     change, last, limit = moves, np.zeros_like(moves), CORRECTION.linear_moves
     answers: list[_Answer] = []
+    tried: list[_Tried] = []
     for _ in range(CORRECTION.more_steps):
         std = np.sqrt(np.diag(step.covariance)[: moves.size])
         if np.max(np.abs(change) / std) <= limit:
@@ -132,8 +135,11 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
         end = base.point.values + step.moves - fit.point.values
         change = last = end - moves
         answers.append(_Answer(end, base.spread_amounts(step, shown), std, change / std))
+        tried.append(_Tried(base, change, step.chi2))
         moves, amounts = _extrapolate(answers[-CORRECTION.memory - 1 :])
         limit = CORRECTION.settled
+    else:
+        base, last = _find_closest(tried, answers, (base, last))
     return _conclude(fit, base, shown, last, evidence, found.sizes)
 
 
@@ -155,19 +161,27 @@ def _describe_plant(
 def keep_fit(fit: LikelihoodFit) -> Correction:
     """Return a fit as it is, for one without a linear response: no effect is estimated."""
     size = fit.point.values.size
+    inverse = invert_information(fit.normal.information)
     none = EffectColumns((), (), (), np.empty(0), ())
     step = JointStep(
         columns=none,
         moves=np.zeros(size),
         amounts=np.empty(0),
-        inverse=invert_information(fit.normal.information),
+        inverse=inverse,
         excess=np.zeros((size, size)),
         chi2=max(fit.chi2, 1.0),
         residuals=fit.normal.residuals,
         contributions={},
     )
     return Correction(
-        fit.mean, fit.covariance, fit.covariance, step, np.zeros((size, size)), np.zeros(size), {}
+        mean=fit.mean,
+        covariance=fit.covariance,
+        noise=fit.covariance,
+        inverse=inverse,
+        step=step,
+        spread=np.zeros((size, size)),
+        last=np.zeros(size),
+        evidence={},
     )
 
 
@@ -217,6 +231,30 @@ class _Answer:
     change: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Expansion of a step, the `change` (p,) of the unknowns by it, and the residual power after
+    it."""
+
+    base: _Expansion
+    change: FloatArray
+    chi2: float
+
+
+def _find_closest(
+    tried: Sequence[_Tried], answers: Sequence[_Answer], last: tuple[_Expansion, FloatArray]
+) -> tuple[_Expansion, FloatArray]:
+    """Return the expansion whose step comes closest to the log, where the steps did not settle.
+
+    Steps may leave the minimum again: an element then locks at another time, and the columns of
+    the effects are those of another motion. Without that the `last` one is returned.
+    """
+    if np.max(np.abs(answers[-1].change)) <= CORRECTION.settled:
+        return last
+    closest = min(reversed(tried), key=lambda one: one.chi2)
+    return closest.base, closest.change
+
+
 def _extrapolate(answers: Sequence[_Answer]) -> tuple[FloatArray, _Amounts]:
     """Return moves and amounts to which the answers of consecutive steps lead.
 
@@ -255,6 +293,7 @@ def _conclude(
         fit.mean.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper)),
         (step.covariance + spread)[:size, :size] + np.outer(rest, rest) + extra,
         _compute_noise(base.normal, step) + extra,
+        chosen.inverse[:size, :size],
         step,
         spread,
         last,

@@ -66,7 +66,7 @@ def find_staged_start(
     if found is None or _is_too_far(found):
         return None
     slipping = problem.cut([s.lockup_time - STAGED_START.clearance for s in shifts])
-    found = minimise(slipping, _scale_friction(slipping, found.point), rough=True)
+    found = minimise(slipping, scale_friction(slipping, found.point), rough=True)
     if found is None or _is_too_far(found):
         return None
     plain = replace(
@@ -103,7 +103,7 @@ def _fix_friction(problem: ShiftObjective, start: ParameterVector) -> ShiftObjec
     return replace(problem, prior=prior)
 
 
-def _scale_friction(problem: ShiftObjective, point: ParameterVector) -> ParameterVector:
+def scale_friction(problem: ShiftObjective, point: ParameterVector) -> ParameterVector:
     """Scale the friction levels to the tried factors with the smallest Q."""
     factors = np.geomspace(
         STAGED_START.min_friction_factor,

@@ -19,14 +19,17 @@ from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
+from drivetwin.estimation.likelihood.diagnostics.identifiability import locate_bounds
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
     NoConvergence,
+    fit_local,
     fit_multistart,
     refine,
+    scale_friction,
 )
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.candidates import (
@@ -69,7 +72,7 @@ class SelectionSettings:
 SELECTION = SelectionSettings()
 _STAGES = TimedStages(
     "model selection",
-    ("search", "slow outputs", "restriction", "minima", "averaging", "other outputs"),
+    ("search", "bounds", "slow outputs", "restriction", "minima", "averaging", "other outputs"),
 )
 
 
@@ -93,6 +96,8 @@ def select_model(
     problem, start = build_problem(signals, drivelines, loss_law, growing, hilly=True)
     with _STAGES.enter("search"), limit_evaluations(SELECTION.max_work) as search:
         best = fit_candidates(problem, start, shifts)
+    with _STAGES.enter("bounds"), limit_evaluations(min(MAX_REFIT_WORK, search.left)):
+        best = retry_from_card(problem, best)
     with (
         _STAGES.enter("slow outputs", "modes of signals"),
         limit_evaluations(MAX_REFIT_WORK),
@@ -178,6 +183,27 @@ def fit_candidates(
         return best
     second = refine(best, problem.select_modes(best.problem.modes), start, shifts)
     return best if second is best else refit_best_mode(problem, second)
+
+
+def retry_from_card(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
+    """Fit again from the card's P0 where a P0 has ended at a bound; return the better fit.
+
+    Beyond the valley between two minima, P0 and the friction level compensate for each other. The
+    levels are sought anew by simulation.
+    """
+    ended = np.logical_or(*locate_bounds(best)) & (np.diag(problem.prior.precision) > 0.0)
+    fills = [k for k, name in enumerate(best.point.names) if name.endswith(".P0") and ended[k]]
+    if not fills:
+        return best
+    values = best.point.values.copy()
+    values[fills] = problem.prior.mean[fills]
+    problem = problem.select_modes(best.problem.modes)
+    try:
+        start = scale_friction(problem, best.point.replace_values(values))
+        found = fit_local(problem, start)
+    except BudgetExceeded:
+        return best
+    return best if found is None or found.chi2 >= best.chi2 else found
 
 
 def _try_fit(
