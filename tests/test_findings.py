@@ -16,6 +16,7 @@ from drivetwin.findings import (
     Code,
     Number,
     Severity,
+    list_fields,
     load_catalogue,
     report,
     select_warnings,
@@ -33,6 +34,15 @@ def test_every_code_is_reported_somewhere() -> None:
     sources += "".join(path.read_text(encoding="utf-8") for path in package.rglob("card_*.toml"))
     names = [(code.name, rf"Code\.{code.name}\b|finding = \"{code.value}\"") for code in Code]
     assert [name for name, pattern in names if not re.search(pattern, sources)] == []
+
+
+@pytest.mark.parametrize("code", Code)
+def test_a_filled_text_has_no_double_stop(code: Code) -> None:
+    """Names that end in a period, such as the advice on an effect."""
+    names = {name: "a name." for name, spec in list_fields(code).items() if not spec}
+    numbers = {name: 1.0 for name, spec in list_fields(code).items() if spec}
+    text = report(code, "x", **names, **numbers).text
+    assert not re.search(r"\.[.;,)]|  |[a-z][.?!][A-Z]", text)
 
 
 @pytest.mark.parametrize("code", Code)

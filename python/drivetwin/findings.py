@@ -348,8 +348,9 @@ class Finding:
         return replace(self, place=replace(self.place, file=file))
 
     def _fill(self, template: str) -> str:
-        """Fill a template; its sentence ends in a period."""
-        text = template.format(subject=self.subject, **self.numbers, **self.names)
+        """Fill a template; its sentence ends in a period, names within it do not."""
+        names = {key: one.removesuffix(".") for key, one in self.names.items()}
+        text = template.format(subject=self.subject, **self.numbers, **names)
         return f"{text}." if text and text[-1] not in ".?!" else text
 
 

@@ -189,7 +189,7 @@ def _format_sensors(answers: Answers) -> Iterator[str]:
     }
     yield ""
     if not stated:
-        yield "# No [sensors]: no tolerances are stated, so intervals cover noise only."
+        yield "# No [sensors]: no tolerances are stated, so intervals contain no sensor errors."
         return
     yield "# One standard deviation of constant sensor errors: limit of the class over √3."
     for role, sensor in stated.items():

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -14,9 +16,11 @@ from drivetwin.estimation.result.verdict import (
     assess,
     assess_with_prior,
     compute_correlation,
+    get_advice,
     propagate,
     refuse_parameter,
 )
+from drivetwin.parameters import SPECS
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.estimation.synthetic import Run, Truth
 from tests.support.arrays import FloatArray
@@ -116,3 +120,13 @@ def test_engine_torque_gain_error_shows_in_eta_alone(stepped: Run) -> None:
     assert std[0] == pytest.approx(0.85 * (1 - 1 / 1.03), rel=0.01)
     assert std[1] < 1e-3 * 17.5
     assert std[2] == 0.0
+
+
+@pytest.mark.parametrize("share", [0.3, 0.99])
+@pytest.mark.parametrize("stem", SPECS)
+def test_advice_never_asks_for_an_entry_that_the_card_states(stem: str, share: float) -> None:
+    """Advice on a value that its own design value, its noise or its sensors limit."""
+    ending = {"gear": "_2", "element": ".B2", "channel": ".x"}.get(SPECS[stem].suffix, "")
+    noise = float(np.sqrt(1.0 - share**2))
+    advice = get_advice(f"{stem}{ending}", noise, share)
+    assert not re.search(r"\b[Ee]nter\b|\b[Ss]tate\b|\bsmaller\b|\bcard\b", advice)

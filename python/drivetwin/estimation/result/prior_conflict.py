@@ -44,6 +44,8 @@ class PriorSettings:
 
     contradiction: float = 3.0
     """Difference of log and design value from which a finding is due [standard deviations]."""
+    agreement: float = 2.0
+    """Difference of log and card within which a ratio agrees [standard deviations of the log]."""
     min_information: float = 0.02
     """Share of the information on a parameter below which none is from the log [ratio]."""
 
@@ -205,9 +207,10 @@ def report_refined(
         interval = None if one is None else one.ci95_total
         if one is None or one.value is None or interval is None or not is_ratio(name):
             continue
-        if prior.std == 0.0 or interval[0] <= prior.value <= interval[1]:
+        apart = abs(one.value - prior.value)
+        if prior.std == 0.0 or apart <= PRIOR.agreement * (one.std_total or 0.0):
             continue
-        is_within = abs(one.value - prior.value) <= Z95 * prior.std
+        is_within = apart <= Z95 * prior.std
         code = Code.RATIO_REFINED if is_within else Code.RATIO_OFF_CARD
         log = Number(one.value, one.unit, Z95 * (one.std_total or 0.0))
         card = Number(prior.value, one.unit, prior.half_width)

@@ -38,7 +38,7 @@ _EXCITE_ENGINE = "Record fast steps of the engine torque in gear."
 _EXPERIMENT = {
     "eta": "Step the pedal in the lower gear.",
     "J_prime": "Step the pedal in the lower gear, or record a shift with a longer inertia phase.",
-    "J_out": "Enter J_out in the vehicle card, or add a shift at another torque.",
+    "J_out": "Add a shift at another torque, or one with a firmer lock-up.",
     "J_vehicle": "Speed up and slow down in gear, or add a coast-down.",
     "Tv_over_if": "Record more time in gear, or add a coast-down.",
     "k_o": _HOLD_STILL,
@@ -50,7 +50,7 @@ _EXPERIMENT = {
     "i_f": "Record the wheel speed.",
     "P0": "Record a shift with a slower pressure ramp, or shifts at two torque levels.",
     "mu": "Record shifts whose inertia phase covers this slip.",
-    "drum": "Enter narrower drum inertias in the vehicle card.",
+    "drum": "Record a shift with a longer inertia phase.",
     "te_delay": "Step the pedal in gear.",
     "p_delay": "Record a shift with faster pressure ramps.",
     "te_lag": "Record a shift with a faster torque reduction.",

@@ -44,7 +44,10 @@ def build_card_tables(card: VehicleCard) -> list[TableBlock]:
         ("Final drive", f"{card.final_drive.value:.4g}"),
         ("Inertia at the engine J′", f"{low:.3g} to {high:.3g} kg·m²"),
         ("Inertia of the vehicle J3", f"{least:.4g} to {most:.4g} kg·m²"),
-        ("Sensor tolerances", ", ".join(card.sensors) or "none: intervals cover noise only"),
+        (
+            "Sensor tolerances",
+            ", ".join(card.sensors) or "none: intervals contain no constant sensor errors",
+        ),
     ]
     heads = ("element", "kind", ("P0 [bar]", ".3g"), ("gain [m³]", ".4g"))
     return [

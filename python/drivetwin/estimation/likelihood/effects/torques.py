@@ -147,7 +147,7 @@ EFFICIENCY_BY_GEAR = Effect(
     0.01,
     "typical loss of one more gear mesh in the power flow, 0.5 to 1.5 %; see Niemann and Winter, "
     "Maschinenelemente II, on losses of gears",
-    "state eta for one gear on the card, or identify each gear from pedal steps in it",
+    "check eta of each gear by pedal steps in it",
     build_efficiency_by_gear,
     apply_efficiency_by_gear,
 )
