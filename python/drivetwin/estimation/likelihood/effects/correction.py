@@ -74,9 +74,10 @@ class Correction:
 
     `mean` are the corrected unknowns with `covariance` (p, p) (total) and `noise` (p, p), that of
     noise alone. `inverse` (p, p) is the inverse of their information, priors included, beside the
-    amounts that move them: nothing widens it. `step` is the last joint step, `spread` (p+q, p+q) what uncertain sizes of the
-    effects add to its covariance; `last` (p,) the move of the unknowns between the last two steps,
-    zero where one was enough. `evidence` is that of each group at the minimum of the fit.
+    amounts that move them: nothing widens it. `step` is the last joint step, `spread` (p+q, p+q)
+    what uncertain sizes of the effects add to its covariance; `last` (p,) the move of the unknowns
+    between the last two steps, zero where one was enough. `evidence` is that of each group at the
+    minimum of the fit.
     """
 
     mean: ParameterVector
