@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -12,13 +13,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.authoring.answers import Key
-from drivetwin.errors import CardError, InputError, RefusedError
+from drivetwin.authoring.card_edit import list_numbers, replace_numbers
+from drivetwin.errors import CardError, DrivetwinError, InputError, RefusedError
 from drivetwin.vehicle.card import load_card
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.workspace_folder import Folder
-from tests.workbench.conftest import LOG
+from tests.workbench.conftest import CARD, LOG
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "vehicles"
 
 ANSWERS: dict[Key, str] = {
     ("name",): "Truck 7",
@@ -148,3 +152,35 @@ def test_any_text_is_an_answer_or_a_fault(begun: Session, data: st.DataObject) -
         form.fill_in({key: data.draw(TEXTS)})
     with suppress(InputError, CardError):
         assert "[[gears]]" in form.format_card("card.toml")
+
+
+def test_the_open_card_is_edited_in_place(begun: Session, place: Path) -> None:
+    """All but the changed numbers stays as it was, comments included; a wrong number is refused."""
+    session = begun
+    shutil.copy(place / CARD, begun.folder.root)
+    session.open(session.get_folder_source(LOG), session.get_folder_source(CARD))
+    before = session.read_card_text()
+    element = session.work.require_card().gears[0].elements[0]
+    numbers = {("final_drive",): "5.1", ("elements", element, "P0_bar"): "0.9+-0.2"}
+    for bad in ("x", "", "1+-2+-3", "-1"):
+        with pytest.raises(DrivetwinError):
+            session.write_edited_card("e.toml", {("final_drive",): bad}, can_replace=False)
+    source = session.write_edited_card("edited.toml", numbers, can_replace=False)
+    session.open_card(source)
+    card = session.work.require_card()
+    assert card.final_drive.value == 5.1
+    assert (card.elements[element].P0.value, card.elements[element].P0.std) == (9e4, 2e4)
+    pairs = zip(before.split("\n"), session.read_card_text().split("\n"), strict=True)
+    assert sum(one != other for one, other in pairs) == 2
+    with pytest.raises(RefusedError):
+        session.write_edited_card("edited.toml", numbers, can_replace=False)
+
+
+@pytest.mark.parametrize("card", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_each_number_of_a_card_can_be_changed(card: Path) -> None:
+    text = card.read_text(encoding="utf-8")
+    numbers = list_numbers(text)
+    assert replace_numbers(text, numbers) == text
+    for path, number in numbers.items():
+        other = "7..8" if ".." in number else "7.25+-0.5"
+        assert list_numbers(replace_numbers(text, {path: other}))[path] in (other, "7.0..8.0")

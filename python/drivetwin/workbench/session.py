@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from drivetwin._util.atomic import write_bytes, write_text
+from drivetwin.authoring import card_edit
 from drivetwin.authoring.answers import Key
+from drivetwin.authoring.card_text import refuse_faults
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.channels.mapping_file import find_project_mapping
 from drivetwin.dyno.dyno import run
@@ -208,14 +210,23 @@ class Session:
             path = self.folder.make_new_path(name, ".toml")
             self.form.file_name = path.name
             self.form.fill_in(texts)
-            text = self.form.format_card(path.name)
-            if path.exists() and not can_replace:
-                raise RefusedError(
-                    "this file exists", "choose another name, or 'replace it' beside the name",
-                    Where(file=path.name),
-                )  # fmt: skip
-            write_text(path, text)
-            return Source(self.folder.get_name(path), path)
+            return self._write_text(path, self.form.format_card(path.name), can_replace)
+
+    def write_edited_card(
+        self, name: str, numbers: Mapping[card_edit.Path, str], *, can_replace: bool
+    ) -> Source:
+        """Write the open card with other numbers into the folder; see `write_card`."""
+        with self.lock:
+            path = self.folder.make_new_path(name, ".toml")
+            text = card_edit.replace_numbers(self.read_card_text(), numbers)
+            refuse_faults(text, path.name)
+            return self._write_text(path, text, can_replace)
+
+    def read_card_text(self) -> str:
+        """Return the text of the open vehicle card. Raises InputError without one."""
+        self.work.require_card()
+        card = self.work.card
+        return "" if card is None else card.path.read_text(encoding="utf-8-sig")
 
     def correct_mapping(self, entries: Sequence[Entry], time_unit: str = "") -> None:
         """Read the selected log again with the corrected mapping; discard the previous results.
@@ -395,6 +406,15 @@ class Session:
             self.view = None
         self.work = work
         self.live = None
+
+    def _write_text(self, path: Path, text: str, can_replace: bool) -> Source:
+        if path.exists() and not can_replace:
+            raise RefusedError(
+                "this file exists", "choose another name, or 'replace it' beside the name",
+                Where(file=path.name),
+            )  # fmt: skip
+        write_text(path, text)
+        return Source(self.folder.get_name(path), path)
 
     def _read_log(
         self,

@@ -7,11 +7,13 @@ import operator
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from drivetwin.channels.units import BAR
 from drivetwin.report.blocks import TableBlock, make_table
 
 if TYPE_CHECKING:
     from drivetwin.logs.survey import Column
     from drivetwin.vehicle.ratio_card import RatioCard
+    from drivetwin.vehicle.spec import PriorValue
     from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
@@ -32,16 +34,21 @@ def build_column_table(
 
 
 def build_card_tables(card: VehicleCard) -> list[TableBlock]:
-    """Build the tables of gears, shift elements and quantities of a vehicle card."""
-    gears = [(gear.name, gear.ratio.value, ", ".join(gear.elements)) for gear in card.gears]
+    """Build the tables of gears, shift elements and quantities of a vehicle card.
+
+    Numbers have one standard deviation as far as the card states or implies one.
+    """
+    gears = [
+        (gear.name, _format_prior(gear.ratio), ", ".join(gear.elements)) for gear in card.gears
+    ]
     elements = [
-        (name, spec.kind, spec.P0.value * 1e-5, spec.gain.value)
+        (name, spec.kind, _format_prior(spec.P0.scale(1.0 / BAR)), _format_prior(spec.gain))
         for name, spec in card.elements.items()
     ]
     low, high = card.J_prime_range
     least, most = card.J_vehicle_range
     facts = [
-        ("Final drive", f"{card.final_drive.value:.4g}"),
+        ("Final drive", _format_prior(card.final_drive)),
         ("Inertia at the engine J′", f"{low:.3g} to {high:.3g} kg·m²"),
         ("Inertia of the vehicle J3", f"{least:.4g} to {most:.4g} kg·m²"),
         (
@@ -49,12 +56,21 @@ def build_card_tables(card: VehicleCard) -> list[TableBlock]:
             ", ".join(card.sensors) or "none: intervals contain no constant sensor errors",
         ),
     ]
-    heads = ("element", "kind", ("P0 [bar]", ".3g"), ("gain [m³]", ".4g"))
+    if card.J_out is not None:
+        facts.insert(3, ("Inertia of the output side", f"{_format_prior(card.J_out)} kg·m²"))
+    heads = ("element", "kind", ("P0 [bar]", "s"), ("gain [m³]", "s"))
     return [
-        make_table("Gears", ("gear", ("ratio", ".4g"), "elements"), gears),
-        make_table("Shift elements", heads, elements),
+        make_table("Gears; ± one standard deviation", ("gear", ("ratio", "s"), "elements"), gears),
+        make_table("Shift elements; ± one standard deviation", heads, elements),
         make_table(card.name, ("quantity", "value"), facts),
     ]
+
+
+def _format_prior(prior: PriorValue) -> str:
+    """Format a design value with one standard deviation, if it has one."""
+    spread = f" ± {prior.std:.2g}" if prior.std > 0.0 else ""
+    assumed = " (assumed)" if prior.assumed else ""
+    return f"{prior.value:.4g}{spread}{assumed}"
 
 
 def build_ratio_tables(card: RatioCard) -> list[TableBlock]:

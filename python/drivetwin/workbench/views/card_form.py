@@ -20,7 +20,7 @@ from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 
-_EXISTING = {"keep": "keep it", "replace": "replace it"}
+EXISTING = {"keep": "keep it", "replace": "replace it"}
 
 
 class QuestionId(BaseModel, strict=True):
@@ -138,7 +138,7 @@ def build_form(form: CardForm) -> list[Component]:
                 ui.make_field("new-card-name", "File name", type="text", value=form.file_name),
                 className="wide",
             ),
-            ui.make_choice("replace-card", "If the file exists", _EXISTING, "keep"),
+            ui.make_choice("replace-card", "If the file exists", EXISTING, "keep"),
             ui.make_button("Write and open the card", "write-card", main=True),
         ),
     ]
