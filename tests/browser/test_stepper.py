@@ -22,8 +22,14 @@ from tests.browser.watch import grave_findings
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
-WIDTHS = (1440, 900)
+WIDTHS, HEIGHT = (1440, 900), 900
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+CUT = """() => Array.from(document.querySelectorAll('section:not([hidden]) :is(td, th, small, '
+  + 'label, .table, .label, .badge, .lock, .range, button, select)'))
+  .filter((one) => one.checkVisibility() && (one.getBoundingClientRect().right > innerWidth + 1
+    || (getComputedStyle(one).display !== 'inline' && one.scrollWidth > one.clientWidth + 1)))
+  .map((one) => `${one.tagName} ${one.className} ${one.textContent.slice(0, 60)}`)"""
+"""Texts and tables of the shown view that are wider than their place."""
 MOST_STOPS = 150
 """Most presses of Tab to reach a control of a view."""
 STATES = (
@@ -118,7 +124,7 @@ def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
     page.wait_for_selector("#model-plot .js-plotly-plot")
     findings = {}
     for width in WIDTHS:
-        page.set_viewport_size({"width": width, "height": 1000})
+        page.set_viewport_size({"width": width, "height": HEIGHT})
         for scheme in SCHEMES:
             page.emulate_media(color_scheme=scheme)
             for name in VIEWS:
@@ -128,6 +134,7 @@ def test_each_view_is_accessible_wide_and_narrow_in_light_and_dark(
                 only = () if scheme == "light" else ("color-contrast",)
                 findings[width, scheme, name] = grave_findings(page, *only)
                 assert page.evaluate("document.body.scrollWidth <= window.innerWidth"), name
+                assert page.evaluate(CUT) == [], (name, width)
         show_view(page, "model")
         _expect_sliders_beside_the_plot(page)
     assert {place: found for place, found in findings.items() if found} == {}
@@ -142,8 +149,15 @@ def _expect_sliders_beside_the_plot(page: Page) -> None:
         assert box is not None
         assert plot is not None
         assert box["x"] + box["width"] <= plot["x"]
-        shown = min(plot["y"] + plot["height"], 1000.0) - max(plot["y"], 0.0)
+        shown = min(plot["y"] + plot["height"], HEIGHT) - max(plot["y"], 0.0)
         assert shown > 350.0, "the plot is outside the window"
+    plot = page.locator("#model-plot .js-plotly-plot")
+    assert plot.evaluate("(one) => one._fullLayout.yaxis.title.text").startswith("output")
+    page.locator(".bench").evaluate("(one) => one.scrollIntoView()")
+    place = page.locator("#model-plot").bounding_box()
+    assert place is not None
+    assert place["y"] < 0.25 * HEIGHT, "the outputs are below the window"
+    expect(page.locator(".slider", has_text="k_o")).to_contain_text(" ± ")
 
 
 def test_a_card_by_the_form(shown: Page, pictures: Path) -> None:
@@ -177,6 +191,12 @@ def test_a_card_by_the_form(shown: Page, pictures: Path) -> None:
     page.select_option("#replace-card", "replace")
     page.click("#write-card")
     expect(page.locator("#message")).to_contain_text("written.toml is written and open")
+    page.get_by_text("Edit the numbers of the open card").click()
+    page.get_by_label("elements.B2.P0_bar").fill("0.85+-0.2")
+    page.get_by_label("Name of the edited card").fill("edited.toml")
+    page.click("#write-edited")
+    expect(page.locator("#message")).to_contain_text("edited.toml is written and open")
+    expect(page.locator("#card-content")).to_contain_text("0.85 ± 0.2")
 
 
 def test_a_blocked_step_leads_to_what_is_missing(shown: Page) -> None:

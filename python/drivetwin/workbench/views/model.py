@@ -10,6 +10,7 @@ from typing import Any
 from dash import ALL, MATCH, Input, Output, Patch, State, html, no_update
 from dash.development.base_component import Component
 
+from drivetwin._util.display_units import format_significant
 from drivetwin.errors import DrivetwinError, InputError, MissingParameterError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.figures.stack import Panel
@@ -242,7 +243,8 @@ def _format_identified(one: Slider) -> str:
     """Format the identified value with its 95 % interval; empty without one."""
     if one.half_width is None:
         return ""
-    return f"{one.value:.4g} ± {one.half_width:.2g} {one.unit}"
+    unit = "" if one.unit == "–" else f" {one.unit}"
+    return f"{one.value:.6g} ± {format_significant(one.half_width, 2)}{unit}"
 
 
 def _explain(fault: DrivetwinError) -> str:
