@@ -151,8 +151,8 @@ def _expect_sliders_beside_the_plot(page: Page) -> None:
         assert box["x"] + box["width"] <= plot["x"]
         shown = min(plot["y"] + plot["height"], HEIGHT) - max(plot["y"], 0.0)
         assert shown > 350.0, "the plot is outside the window"
-    plot = page.locator("#model-plot .js-plotly-plot")
-    assert plot.evaluate("(one) => one._fullLayout.yaxis.title.text").startswith("output")
+    drawn = page.locator("#model-plot .js-plotly-plot")
+    assert drawn.evaluate("(one) => one._fullLayout.yaxis.title.text").startswith("output")
     page.locator(".bench").evaluate("(one) => one.scrollIntoView()")
     place = page.locator("#model-plot").bounding_box()
     assert place is not None

@@ -161,7 +161,10 @@ def test_the_open_card_is_edited_in_place(begun: Session, place: Path) -> None:
     session.open(session.get_folder_source(LOG), session.get_folder_source(CARD))
     before = session.read_card_text()
     element = session.work.require_card().gears[0].elements[0]
-    numbers = {("final_drive",): "5.1", ("elements", element, "P0_bar"): "0.9+-0.2"}
+    numbers: dict[tuple[str | int, ...], str] = {
+        ("final_drive",): "5.1",
+        ("elements", element, "P0_bar"): "0.9+-0.2",
+    }
     for bad in ("x", "", "1+-2+-3", "-1"):
         with pytest.raises(DrivetwinError):
             session.write_edited_card("e.toml", {("final_drive",): bad}, can_replace=False)
