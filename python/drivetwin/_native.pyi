@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "LANES",
     "ScannedTable",
     "TableScanner",
     "actuator_pressure",
@@ -24,6 +25,8 @@ __all__ = [
     "simulate_network",
     "whiten",
 ]
+
+LANES: int
 
 _Array = NDArray[np.float64]
 _Options = tuple[float, float, int | None, bool, bool]

@@ -404,3 +404,62 @@ def test_a_sine_takes_finite_numbers_only(name: str) -> None:
     for value in ("x", math.nan, None):
         with pytest.raises(InputError, match=f"{name} of a sine"):
             Sine(**numbers | {name: value})
+
+
+def test_completed_runs_have_a_value_at_every_point_whatever_their_end() -> None:
+    elements = [
+        inertia("a", 0.2),
+        inertia("b", 3.0),
+        inertia("c", 0.004),
+        inertia("d", 7.0),
+        clutch("C", "a", "b"),
+        {
+            "type": "planetary",
+            "name": "P",
+            "sun": "d",
+            "ring": "b",
+            "carrier": "c",
+            "z": 3.1,
+            "planet_inertia": 0.0,
+        },
+        {"type": "one_way_clutch", "name": "F", "a": "d", "b": "a"},
+        {
+            "type": "backlash",
+            "name": "B",
+            "a": "b",
+            "b": "c",
+            "stiffness": 2e4,
+            "damping": 20.0,
+            "gap": 0.0,
+        },
+        torque("a"),
+    ]
+    inputs = {"pressure": line((0, 50), (9, 50)), "torque": line((0, -60), (9, -60))}
+    start = Start(dict.fromkeys("abcd", 30.0), {}, ("C", "F"))
+    # Of these ends some lie an ulp behind the sum of start and length of the last step.
+    for end in (1.91, *np.random.default_rng(7).uniform(0.5, 5.0, 40)):
+        found = simulate(elements, inputs, start, np.linspace(0.0, end, 20), [("speed", "a")])
+        assert found.status == "completed"
+        assert np.isfinite(found.columns["speed", "a"]).all(), end
+
+
+@pytest.mark.parametrize("locked", [("c",), ()])
+def test_driveline_at_rest_but_for_round_off_passes_the_audit(locked: tuple[str, ...]) -> None:
+    elements = [
+        inertia("a", 18.0),
+        inertia("b", 2.0),
+        clutch("c", "a", "ground"),
+        gear("G", "a", "b", 2.0),
+        torque("a"),
+    ]
+    start = Start({"a": 2.8e-14, "b": 1.4e-14}, {}, locked)
+    found = run(
+        elements, start, ("speed", "a"), pressure=line((0, 9), (1, 9)), torque=line((0, 5), (1, 5))
+    )
+    assert found.status == "completed"
+
+
+def test_energy_beyond_the_largest_number_is_a_state_that_is_not_finite() -> None:
+    start = Start({"a": 1e200, "b": 0.0})
+    found = run(PAIR, start, ("speed", "a"), pressure=ONE)
+    assert "not finite" in found.status

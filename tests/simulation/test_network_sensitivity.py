@@ -274,6 +274,27 @@ def _compare_networks(seeds: range) -> _Count:
     return count
 
 
+@pytest.mark.parametrize("v_s", [0.1, 0.5])
+def test_derivative_by_stiction_where_stiction_is_zero(v_s: float) -> None:
+    def elements(mu_s: float) -> list[Element]:
+        law = {"friction": {"mu_c": 0.1, "mu_s": mu_s, "v_s": v_s, "mu_v": 0.0}, "gain": 0.01}
+        return [
+            build_element("inertia", "J a", node="a", inertia=0.1),
+            build_element("inertia", "J b", node="b", inertia=0.3),
+            build_element("torque", "T", node="a", input="T"),
+            build_element(
+                "clutch", "K", a="a", b="b", pressure="P", drum_inertia=0.0, p0=0.0, peak=1.0, **law
+            ),
+        ]
+
+    inputs = {"T": Signal(TIME, np.full(101, 20.0)), "P": Signal(TIME, np.full(101, 1e5))}
+    start, step = Start({"a": 100.0, "b": 80.0}), 1e-5
+    found = differentiate(elements(0.1), inputs, start, TIME, SPEEDS, ["K.friction.mu_s"])
+    ends = [simulate(elements(0.1 + h), inputs, start, TIME, SPEEDS) for h in (step, -step)]
+    difference = (ends[0].events[0].time - ends[1].events[0].time) / (2 * step)
+    assert found.event_times[0, 0] == pytest.approx(difference, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     "seeds", [range(24), pytest.param(range(24, 324), marks=pytest.mark.exhaustive)]
 )

@@ -42,6 +42,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(gearbox::gear_statics, module)?)?;
     module.add_function(wrap_pyfunction!(gearbox::reduce_shift, module)?)?;
     module.add_function(wrap_pyfunction!(whitening::whiten, module)?)?;
+    module.add("LANES", drivetwin_core::simulate::LANES)?;
     module.add_class::<table::TableScanner>()?;
     module.add_class::<table::ScannedTable>()?;
     Ok(())

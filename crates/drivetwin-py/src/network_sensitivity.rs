@@ -7,13 +7,15 @@ use crate::plain::{Event, events_of, status_of};
 use crate::scenario::{NamedStart, Samples, Sine, parse, signals_of};
 use drivetwin_core::network::Network;
 use drivetwin_core::number::Dual;
-use drivetwin_core::simulate::{LANES, RunOptions, SimulateError, Start, run};
+use drivetwin_core::simulate::{RunOptions, SimulateError, Start, run};
 use drivetwin_core::solver::Settings;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 /// Most unknowns of a narrow pass.
 const FEW: usize = 8;
+/// Most unknowns of a pass.
+const MANY: usize = 16;
 /// Value and the weights of its derivatives by lanes.
 type Seeded = (f64, Vec<(usize, f64)>);
 /// Columns (n_outputs, n_time), events, status, derivatives of every column (n_time, lanes) and of every
@@ -29,7 +31,7 @@ type Found<'py> = (
 /// Tolerance, longest step [s], number of unknowns.
 type Options = (f64, f64, usize);
 
-/// Simulate a driveline given as JSON and differentiate by its seeded numbers, at most [`LANES`] unknowns.
+/// Simulate a driveline given as JSON and differentiate by its seeded numbers, at most [`MANY`] unknowns.
 #[pyfunction]
 pub fn network_sensitivities<'py>(
     py: Python<'py>,
@@ -43,7 +45,7 @@ pub fn network_sensitivities<'py>(
     let given = (signals, start, grid);
     match options.2 {
         ..=FEW => differentiate::<FEW>(py, driveline, &outputs, given, options),
-        _ => differentiate::<LANES>(py, driveline, &outputs, given, options),
+        _ => differentiate::<MANY>(py, driveline, &outputs, given, options),
     }
 }
 

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from drivetwin import _native
 from drivetwin._native import network_sensitivities
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.simulation.dual_clutch import (
@@ -39,8 +40,8 @@ from drivetwin.simulation.network import (
 from drivetwin.simulation.serialize import as_json, as_names, is_number
 from drivetwin.simulation.variable import Variable, iterate_variables, seed, seed_description
 
-LANES = 16
-"""Unknowns that one pass of the core differentiates by."""
+LANES: int = getattr(_native, "LANES", 8)
+"""Unknowns that one pass of the core differentiates by: 16, or 8 in a build for demos."""
 _SMOOTH_AT_ZERO = ("mu_v", "constant", "aero", "damping", "p0")
 """Fields whose laws have no corner at zero. Others change the structure of the network there: a
 gain of zero holds nothing, an inertia of zero leaves a constraint."""

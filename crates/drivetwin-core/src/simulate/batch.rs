@@ -183,9 +183,10 @@ impl Work<'_> {
         let columns = plan.targets.len() * count;
         let mut spare = Vec::new();
         let values: Vec<&mut [f64]> = if let Keep::Misfit(_) = self.keep {
-            spare.resize(runs.len() * columns, 0.0);
+            spare.resize(runs.len() * columns, f64::NAN);
             spare.chunks_exact_mut(columns.max(1)).collect()
         } else {
+            group.iter_mut().for_each(|job| job.values.fill(f64::NAN));
             group.iter_mut().map(|job| &mut *job.values).collect()
         };
         let points = GridPoints { at_knots: &points, count };
@@ -193,6 +194,11 @@ impl Work<'_> {
         let events = run_lockstep(cache, &inputs, plan.settings, mask, x, &locked, &mut recorder);
         for (place, (job, events)) in group.iter_mut().zip(events).enumerate() {
             let Some(events) = events else { continue };
+            let own = if spare.is_empty() { &*job.values } else { &spare[place * columns..] };
+            // Points without a value: the run is done again alone.
+            if own.iter().take(count).any(|value| value.is_nan()) {
+                continue;
+            }
             if !spare.is_empty() {
                 self.keep.reduce(&spare[place * columns..][..columns], plan.grid.len(), job.values);
             }

@@ -175,7 +175,7 @@ pub(super) fn run_controlled<'n>(
         let outcome = pass_tasks(&mut run, &mut recorder, tasks, &mut trace, &mut drive);
         events = std::mem::take(&mut run.state.events);
         *known = run.into_cache();
-        outcome
+        outcome.and_then(|()| recorder.check_complete())
     };
     let status = integrate().err().unwrap_or(Status::Completed);
     let (columns, _) = recorder.finish();

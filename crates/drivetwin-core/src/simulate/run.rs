@@ -157,11 +157,16 @@ impl<T: Real> Plan<T> {
 
     /// Refuse an energy balance that does not close to the accuracy of the run.
     fn check_audit(&self, time: f64, error: f64, energy: f64) -> Result<(), Status> {
-        let rtol = self.settings.audit_rtol();
-        if rtol.is_infinite() || error.abs() <= rtol * energy {
+        if self.settings.order.is_some() {
             return Ok(());
         }
-        Err(Status::OpenBalance { time, error, energy })
+        if !error.is_finite() || !energy.is_finite() {
+            return Err(Status::NotFinite { time });
+        }
+        match error.abs() <= self.settings.audit_tolerance(energy) {
+            true => Ok(()),
+            false => Err(Status::OpenBalance { time, error, energy }),
+        }
     }
 
     /// One run. If it fails on the way it ends with its status, and with NaN from there on.
@@ -196,7 +201,7 @@ impl<T: Real> Plan<T> {
             events = std::mem::take(&mut run.state.events);
             grazing = run.grazing.take();
             *known = run.into_cache();
-            outcome
+            outcome.and_then(|()| recorder.check_complete())
         };
         let status = integrate().err().unwrap_or(Status::Completed);
         let frictions = network.frictions.iter().map(|row| &row.element);

@@ -12,8 +12,8 @@ use crate::number::Dual;
 use crate::solver::{Settings, Signal, Status};
 use thiserror::Error;
 
-/// Most unknowns that one pass differentiates for.
-pub const LANES: usize = 16;
+/// Most unknowns that one pass differentiates for: more are slower where loops are not fully optimised.
+pub const LANES: usize = if cfg!(feature = "wide") { 16 } else { FEW };
 /// Most unknowns of the narrow pass.
 const FEW: usize = 8;
 

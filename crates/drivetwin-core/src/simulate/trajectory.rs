@@ -125,7 +125,8 @@ impl<'g, T: Real> Recorder<'g, T> {
 
     /// Record the grid points before the end of the step; `last` includes the end.
     pub fn sample(&mut self, run: &Integrator<'_, T>, step: &Step<T>, last: bool) {
-        let (start, end) = (step.start.re(), (step.start + step.length).re());
+        // The time reached, not the sum of start and length, which may miss the last point by round-off.
+        let (start, end) = (step.start.re(), run.time().re());
         for column in &mut self.columns {
             if let Column::Power(power) | Column::Work(power, _) = column {
                 power.enter_mode(&run.state);
@@ -196,6 +197,14 @@ impl<'g, T: Real> Recorder<'g, T> {
             also(run, &step);
         }
         Ok(())
+    }
+
+    /// Refuse a run that has ended without a value at every point of the grid.
+    pub fn check_complete(&self) -> Result<(), Status> {
+        match self.grid.get(self.next) {
+            Some(&time) => Err(Status::Unrecorded { time }),
+            None => Ok(()),
+        }
     }
 
     /// Columns at full length and their derivatives, as in [`Trajectory`].

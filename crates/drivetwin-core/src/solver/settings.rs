@@ -2,7 +2,7 @@
 //! Accuracy settings of a run.
 
 use crate::solver::tolerances::{
-    AUDIT_PER_TRUNCATION, AUDIT_RTOL, TAYLOR_TOL, TAYLOR_TOL_BETWEEN_SAMPLES,
+    AUDIT_ATOL, AUDIT_PER_TRUNCATION, AUDIT_RTOL, TAYLOR_TOL, TAYLOR_TOL_BETWEEN_SAMPLES,
 };
 
 /// Accuracy of the integration.
@@ -28,13 +28,10 @@ impl Settings {
         Accuracy { tolerance: self.tolerance.max(least), order: self.order }
     }
 
-    /// Error of the energy balance that a completed run may have, relative to its largest energy; any in
-    /// convergence studies.
-    pub(crate) fn audit_rtol(&self) -> f64 {
-        match self.order {
-            Some(_) => f64::INFINITY,
-            None => AUDIT_RTOL.max(self.tolerance * AUDIT_PER_TRUNCATION),
-        }
+    /// Error of the energy balance that a completed run of this largest energy may have, J.
+    pub(crate) fn audit_tolerance(&self, energy: f64) -> f64 {
+        let rtol = AUDIT_RTOL.max(self.tolerance * AUDIT_PER_TRUNCATION);
+        (rtol * energy).max(AUDIT_ATOL)
     }
 
     /// Round-off accuracy throughout.

@@ -83,6 +83,11 @@ pub enum Status {
         /// Time, s.
         time: f64,
     },
+    /// A point of the grid has no value although the run reached its end.
+    Unrecorded {
+        /// Time of the point, s.
+        time: f64,
+    },
     /// A state is no longer finite.
     NotFinite {
         /// Time, s.
@@ -141,6 +146,7 @@ impl fmt::Display for Status {
             ),
             Self::Interrupted { time } => write!(f, "interrupted at {time:.9} s"),
             Self::StepTooSmall { time } => write!(f, "step too small at {time:.9} s"),
+            Self::Unrecorded { time } => write!(f, "no value was recorded at {time:.9} s"),
             Self::NotFinite { time } => write!(f, "state not finite at {time:.9} s"),
             Self::CommandNotFinite { time, measured } => {
                 write!(f, "the controller's command is not finite at {time:.9} s ({measured})")

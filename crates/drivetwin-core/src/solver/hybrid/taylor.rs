@@ -84,6 +84,7 @@ impl<T: Number> TaylorExpansion<T> {
         // Successive terms that must be small: every other one of an even or odd motion is zero, and
         // products of motions that start with high powers of time leave longer gaps.
         let window = if products { 4 } else { 2 };
+        let hidden = T::DERIVATIVES && hides_stiction(network, branches);
         let mut sizes = [T::Values::of(f64::INFINITY); TERMS];
         let mut power = T::Values::of(1.0);
         let mut growing = runs;
@@ -96,7 +97,7 @@ impl<T: Number> TaylorExpansion<T> {
             }
             self.channel_terms(network, mode, branches, k);
             power *= h;
-            let size = self.next_term(mode, k);
+            let size = self.next_term(mode, k, hidden);
             sizes[k + 1] = power * if curved { size.larger(self.input_size(k + 1)) } else { size };
             if accuracy.order.is_none() {
                 let recent = largest(&sizes[(k + 2).saturating_sub(window)..k + 2]);
@@ -284,13 +285,15 @@ impl<T: Number> TaylorExpansion<T> {
     }
 
     /// Coefficient `k + 1` of the states, by coefficient `k` of the basis. Returns the largest, relative
-    /// to the scale of its state.
+    /// to the scale of its state, with its derivatives where these are longer series than the values.
     #[inline(always)]
-    fn next_term(&mut self, mode: &Mode<T>, k: usize) -> T::Values {
+    fn next_term(&mut self, mode: &Mode<T>, k: usize, derivatives: bool) -> T::Values {
         let mut largest = T::Values::zero_();
         for (i, state) in self.states.iter_mut().enumerate() {
             state[k + 1] = mode.rates.times(i, &self.basis) * INVERSE[k + 1];
-            largest = (state[k + 1].re().magnitude() * self.scales[i].re()).larger(largest);
+            let term = &state[k + 1];
+            let size = if derivatives { term.size() } else { term.re().magnitude() };
+            largest = (size * self.scales[i].re()).larger(largest);
         }
         largest
     }
@@ -312,6 +315,15 @@ impl<T: Number> TaylorExpansion<T> {
             *scale = T::promote(size.recip());
         }
     }
+}
+
+/// Return true if a stiction of zero has a derivative: the values are then without the exponential that the
+/// derivatives follow, and do not bound its truncation error.
+fn hides_stiction<T: Number>(network: &Network<T>, branches: &[Branch]) -> bool {
+    network.channels.iter().zip(branches).any(|(channel, branch)| {
+        let zero = |stiction: T| !stiction.is_constant() && stiction.re().decide(|v| v == 0.0);
+        matches!(branch, Branch::Moving { .. }) && channel.stiction().is_some_and(|s| zero(s.1))
+    })
 }
 
 /// Return true if an input is not linear in time.
