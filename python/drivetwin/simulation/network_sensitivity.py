@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drivetwin import _native
+from drivetwin._native import LANES as _LANES
 from drivetwin._native import network_sensitivities
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.simulation.dual_clutch import (
@@ -40,7 +40,7 @@ from drivetwin.simulation.network import (
 from drivetwin.simulation.serialize import as_json, as_names, is_number
 from drivetwin.simulation.variable import Variable, iterate_variables, seed, seed_description
 
-LANES: int = getattr(_native, "LANES", 8)
+LANES = _LANES
 """Unknowns that one pass of the core differentiates by: 16, or 8 in a build for demos."""
 _SMOOTH_AT_ZERO = ("mu_v", "constant", "aero", "damping", "p0")
 """Fields whose laws have no corner at zero. Others change the structure of the network there: a
