@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Coverage and error of the observers, over twins and logs of one driveline.
+"""Coverage and error of the observer, over twins and logs of one driveline.
 
     python -m benchmarks.observer [LOGS]
 
 Each round identifies one log of `paper_steps` and observes another, which has a torque reduction of
-30 %. Printed by observer, torque and phase: share of the samples in the 95 % band, rms error and
+30 %. Printed by log, torque and phase: share of the samples in the 95 % band, rms error and
 mean standard deviation in N m.
 """
 
@@ -18,11 +18,9 @@ from pathlib import Path
 import numpy as np
 
 import drivetwin
-from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.observer.kind import Observer
 from drivetwin.observer.observe import estimate_torques
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
@@ -52,17 +50,13 @@ def _measure(folder: Path, seed: int, found: dict[tuple[str, str, str], list[Row
     second, _, _ = write_run(folder / "second.csv", other)
     log = drivetwin.read_log(second, card)
     kept = {k: v for k, v in log.channels.items() if not k.startswith("pressure.")}
-    cases: dict[str, tuple[ShiftLog, Observer]] = {
-        "smoother": (log, Observer.SMOOTHER),
-        "smoother, no pressures": (replace(log, channels=kept), Observer.SMOOTHER),
-        "simulation": (log, Observer.SIMULATION),
-    }
+    cases = {"with pressures": log, "without pressures": replace(log, channels=kept)}
     exact = {"output_torque": other.trajectory.shaft_torque} | {
         f"torque.{name}": torque for name, torque in other.trajectory.clutch_torque.items()
     }
-    for case, (seen, by) in cases.items():
+    for case, seen in cases.items():
         (shift,) = detect_shifts(seen, card).shifts
-        one = estimate_torques(twin, seen, shift, by)
+        one = estimate_torques(twin, seen, shift)
         phases = {
             "before": (one.time[0], shift.inertia_phase[0] - ONSET),
             "torque": (shift.inertia_phase[0] - ONSET, shift.inertia_phase[0]),
@@ -82,7 +76,7 @@ def _measure(folder: Path, seed: int, found: dict[tuple[str, str, str], list[Row
 def main() -> None:
     """Print the means over the rounds."""
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS
-    print("| observer | torque | phase | in band | rmse | std |\n|---|---|---|---|---|---|")
+    print("| log | torque | phase | in band | rmse | std |\n|---|---|---|---|---|---|")
     for (case, name, phase), rows in measure(rounds).items():
         share, error, std = np.mean(rows, axis=0)
         print(f"| {case} | {name} | {phase} | {100 * share:.0f} % | {error:.1f} | {std:.1f} |")

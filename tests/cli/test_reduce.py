@@ -24,7 +24,7 @@ def test_the_table_names_ratios_members_and_errors(capsys: pytest.CaptureFixture
     assert "Largest error over the reference shift" in shown
 
 
-def test_json_holds_the_mass_matrix_and_both_errors(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_holds_the_mass_matrix_and_the_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reduce", "three-set-3000", "--shift", "2-3", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["on_coming"]["i_c"] == pytest.approx(0.41, abs=1e-3)
@@ -32,8 +32,7 @@ def test_json_holds_the_mass_matrix_and_both_errors(capsys: pytest.CaptureFixtur
     assert M12 == M21
     assert document["coupling_ratio"] == pytest.approx(abs(M12) / (M11 * M22) ** 0.5)
     assert sum(member["coupling"] for member in document["members"]) == pytest.approx(M12)
-    seen = document["error_simulated"]["shaft_torque"]
-    assert document["error_estimate"]["shaft_torque"] == pytest.approx(seen, rel=0.2)
+    assert document["error_simulated"]["shaft_torque"] > 0.0
     assert document["no_error_because"] is None
 
 

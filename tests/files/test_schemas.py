@@ -15,8 +15,6 @@ from jsonschema import Draft202012Validator
 
 from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.read_options import ChannelSpec
-from drivetwin.export.parameters.json_file import CODEC
-from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.files.bus_file import BusFile
 from drivetwin.files.fit_file import build_fit_file
 from drivetwin.files.result_file import ResultFile
@@ -59,8 +57,6 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
     match kind:
         case FileKind.RESULT:
             yield json.loads(ResultFile.from_result(sample.identification()).to_json())
-        case FileKind.PARAMETERS:
-            yield json.loads(CODEC.text(collect_parameters(twin())))
         case FileKind.FIT:
             yield json.loads(build_fit_file(fit_log(ModelName.TIP_IN), ["a.csv"], {}).to_json())
         case FileKind.BUS:

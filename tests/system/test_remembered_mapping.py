@@ -61,7 +61,7 @@ def test_from_a_log_without_units_to_a_simulation_of_another(
     (shift,) = json.loads(captured.out)["shifts"]
     assert shift["fit"]["output_torque"]["all"]["fit_percent"] > 85.0
     assert "M_ist in 'Nm'" in captured.err
-    assert main(["observe", twin, str(other), "--by", "simulation"]) == 0
+    assert main(["observe", twin, str(other)]) == 0
 
     without = second / "without.csv"
     without.write_text(other.read_text(encoding="utf-8").replace("M_ist", "X", 1), encoding="utf-8")

@@ -47,7 +47,7 @@ def export(request: Export, *, as_json: bool) -> None:
     """Write the identified model for another program.
 
     c: C99 sources for a controller. fmu: co-simulation FMU with sources. modelica: package of
-    components of the Standard Library. ssv, cdfx, dcm, m, json, csv: parameter files with units and
+    components of the Standard Library. ssv, cdfx, dcm, m, csv: parameter files with units and
     intervals.
     """
     from drivetwin.files.twin_file import load_twin

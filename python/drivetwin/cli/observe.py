@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.outputs import LOG_ENDINGS, PAGE, select_outputs
-from drivetwin._util.request import option, output_file
+from drivetwin._util.request import output_file
 from drivetwin.cli.arguments import TwinLogInput, read_twin_log
 from drivetwin.cli.output import print_blocks, print_json, print_line, print_paragraph, show_step
 from drivetwin.errors import DamagedChannelError
-from drivetwin.observer.kind import Observer
 
 if TYPE_CHECKING:
     from drivetwin.logs.raw import RawChannel
@@ -24,11 +23,6 @@ if TYPE_CHECKING:
 class Observe(TwinLogInput, command="observe"):
     """Arguments of `observe`."""
 
-    by: Observer = option(
-        "smoother: from the measured speeds, with or without pressures; simulation: from engine "
-        "torque and pressures alone.",
-        default=Observer.SMOOTHER,
-    )
     output: tuple[Path, ...] = output_file(
         "File for the torques: .csv, .parquet, .mf4 or .mat; page with the figures: .html; "
         "repeatable.",
@@ -49,11 +43,11 @@ def observe(request: Observe, *, as_json: bool) -> None:
     from drivetwin.report.observer import build_torque_blocks, render_observations
     from drivetwin.shifts.detect import require_shifts
 
-    model, by = load_twin(request.twin), request.by
+    model = load_twin(request.twin)
     recording, card = read_twin_log(model, request.log, request.vehicle, request.channels)
     shifts = require_shifts(recording, card)
     found, left_out = _observe_shifts(
-        shifts.shifts, lambda shift: estimate_torques(model, recording, shift, by), by
+        shifts.shifts, lambda shift: estimate_torques(model, recording, shift)
     )
     for table in select_outputs(request.output, *LOG_ENDINGS):
         _write_observations(table, found)
@@ -61,7 +55,7 @@ def observe(request: Observe, *, as_json: bool) -> None:
         write_text(page, render_observations(found, recording))
     if as_json:
         shown = [_to_document(one) for one in found]
-        print_json({"observer": by, "shifts": shown, "left_out": left_out})
+        print_json({"shifts": shown, "left_out": left_out})
         return
     for one in found:
         print_blocks(build_torque_blocks(one))
@@ -72,7 +66,7 @@ def observe(request: Observe, *, as_json: bool) -> None:
 
 
 def _observe_shifts(
-    shifts: Sequence[Shift], look: Callable[[Shift], Observation], by: Observer
+    shifts: Sequence[Shift], look: Callable[[Shift], Observation]
 ) -> tuple[list[Observation], dict[str, str]]:
     """Observe each shift; return the observations, and the skip reason by shift name."""
     found: list[Observation] = []
@@ -80,7 +74,7 @@ def _observe_shifts(
     for shift in shifts:
         name = f"{shift.start_gear}-{shift.end_gear}"
         try:
-            with show_step(f"observing shift {name} by {by}"):
+            with show_step(f"observing shift {name}"):
                 found.append(look(shift))
         except DamagedChannelError as refusal:
             left_out[f"{name} at {shift.torque_phase[0]:z.3f} s"] = refusal.what

@@ -13,7 +13,6 @@ from drivetwin.errors import InputError
 from drivetwin.report.blocks import Tone, make_notes
 
 if TYPE_CHECKING:
-    from drivetwin.gearbox import CouplingError
     from drivetwin.report.gearbox import ReducedShift
 
 
@@ -28,7 +27,7 @@ def reduce(request: Reduce, *, as_json: bool) -> None:
     """Reduce a shift to the dual-clutch form and compute the error of the reduction.
 
     Print the ratios of both elements, the mass matrix, and condition (1) with the members that
-    violate it. Print the error of neglecting their coupling, as estimated and as simulated.
+    violate it. Simulate a reference shift and print the error of neglecting their coupling.
     """
     from drivetwin.gearbox import describe_ratio_differences, load_gearbox
     from drivetwin.gearbox import reduce as reduce_shift
@@ -53,9 +52,6 @@ def reduce(request: Reduce, *, as_json: bool) -> None:
 def _to_document(found: ReducedShift) -> dict[str, Any]:
     reduction = found.reduction
 
-    def error(of: CouplingError | None) -> dict[str, float] | None:
-        return None if of is None else asdict(of)
-
     return {
         "gearbox": reduction.gearbox.name,
         "from": reduction.from_gear,
@@ -69,7 +65,6 @@ def _to_document(found: ReducedShift) -> dict[str, Any]:
         "condition": reduction.describe_condition(),
         "members": [asdict(each) | {"coupling": each.coupling} for each in reduction.members],
         "violations": [each.member for each in reduction.violations],
-        "error_estimate": error(found.estimated),
-        "error_simulated": error(found.simulated),
+        "error_simulated": None if found.error is None else asdict(found.error),
         "no_error_because": found.reason or None,
     }

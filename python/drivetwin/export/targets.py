@@ -66,8 +66,7 @@ class Target(StrEnum):
     CDFX = "cdfx", "CDFX", "calibration data, ASAM CDF"
     DCM = "dcm", "DCM", "calibration data, ETAS DAMOS"
     M = "m", "MATLAB", "script with all parameters"
-    JSON = "json", "JSON", "parameters with units and intervals"
-    CSV = "csv", "CSV", "parameters as a table"
+    CSV = "csv", "CSV", "parameters with units and intervals as a table"
 
     def __new__(cls, value: str, label: str = "", text: str = "", ending: str = "") -> Self:
         """Make a member of its name on the command line and the words for it."""

@@ -27,7 +27,6 @@ class FileKind(StrEnum):
     FLEET_RULES = "fleet-rules"
     RESULT = "result"
     TWIN = "twin"
-    PARAMETERS = "parameters"
     ELEMENTS = "elements"
     MODEL = "model"
     FIT = "fit"
@@ -47,7 +46,6 @@ _MODELS = {
     FileKind.FIT: ("files.fit_file", "FitFile"),
     FileKind.RATIO_CARD: ("vehicle.ratio_card", "RatioCardFile"),
     FileKind.BUS: ("files.bus_file", "BusFile"),
-    FileKind.PARAMETERS: ("export.parameters.json_file", "ParameterFile"),
 }
 """Module below the package, and the model there, by which the program itself checks the file; each
 is imported when it is asked for."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from drivetwin.gearbox.card import list_builtin_gearboxes, load_gearbox
 from drivetwin.gearbox.compare import Comparison, compare
-from drivetwin.gearbox.estimate import estimate
 from drivetwin.gearbox.gears import GearStatics, describe_ratio_differences, solve_gear
 from drivetwin.gearbox.maneuver import CouplingError
 from drivetwin.gearbox.network import build_network_elements
@@ -22,7 +21,6 @@ __all__ = [
     "build_network_elements",
     "compare",
     "describe_ratio_differences",
-    "estimate",
     "list_builtin_gearboxes",
     "load_gearbox",
     "reduce",

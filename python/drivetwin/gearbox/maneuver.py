@@ -65,8 +65,7 @@ FILL = 0.02
 class Maneuver:
     """The operating point of a reference shift; torques [N m], speeds [rad/s], times [s].
 
-    The inertia phase begins at `release` with the `output_speed` and ends at `lock`; `swing_in`,
-    `swing_out` are the speed changes of input and output within it. `handover` and
+    The inertia phase begins at `release` with the `output_speed` and ends at `lock`. `handover` and
     `synchronising` are the on-coming torque at its begin and, in the mean, within it; `on_coming`
     is the capacity of the on-coming element. `load` is the load at the output.
     """
@@ -77,8 +76,6 @@ class Maneuver:
     old_ratio: float
     new_ratio: float
     output_speed: float
-    swing_in: float
-    swing_out: float
     handover: float
     synchronising: float
     on_coming: Capacity
@@ -91,14 +88,6 @@ class Maneuver:
         """Slip of the on-coming element at the release, rad/s, without its sign."""
         per_speed = self.new_ratio / self.old_ratio - 1.0
         return abs(per_speed * self.output_speed * self.old_ratio / self.on_coming_i_c)
-
-    def compute_mean_torque(self, slip: float) -> float:
-        """Mean on-coming torque over the last `slip` [rad/s] before lock-up, N m."""
-        return (
-            self.synchronising
-            * self.on_coming.compute_mean_mu(slip)
-            / self.on_coming.compute_mean_mu(self.slip)
-        )
 
     @property
     def vehicle(self) -> float:
@@ -154,8 +143,6 @@ def plan(reduction: Reduction, drive: Drive) -> Maneuver:
         old_ratio=old.ratio,
         new_ratio=new.ratio,
         output_speed=drive.engine_speed / old.ratio,
-        swing_in=swing,
-        swing_out=pulled - new.ratio * inertia / vehicle * swing,
         handover=new.i_c * torque,
         synchronising=synchronising,
         on_coming=reduction.gearbox.get_capacity(new.element),

@@ -78,7 +78,7 @@ def _compute_drum_inertias(reduction: Reduction, drive: Drive) -> tuple[float, f
         raise ReductionError(
             f"no drum inertia of {reduction.off_going.element} or {reduction.on_coming.element} "
             f"can carry M12 = {M12:.4g} kg·m² of shift {reduction.from_gear}-{reduction.to_gear}",
-            "leave the coupling out (keep_coupling=False) and read the estimate of its error, or "
+            "leave the coupling out (keep_coupling=False) and read its simulated error, or "
             "simulate the whole gearbox",
         )
     return best

@@ -201,13 +201,11 @@ def select_uncertain(
     shift: Shift,
     stems: tuple[str, ...],
     more: Mapping[str, float] | None = None,
-    *,
-    laws: bool = False,
 ) -> ModelDistribution:
     """Describe the parameters `stems` of the twin and the ratios of the shift.
 
     `J_prime` stands for that of its `select_inertia_gear`. `more` are further standard deviations
-    by id, of errors that are not the twin's. With `laws` the friction laws are part of it.
+    by id, of errors that are not the twin's.
     Raises MissingParameterError where the twin has no value for one of them.
     """
     if twin.over_eta:
@@ -220,4 +218,4 @@ def select_uncertain(
     ids = [inertia if stem == "J_prime" else stem for stem in stems]
     ratios = (make_ratio_id(shift.start_gear), make_ratio_id(shift.end_gear), FINAL_DRIVE)
     ids += [name for name in ratios if name in twin.covariance_ids]
-    return describe_model(twin, shift, ids, more=more, laws=laws)
+    return describe_model(twin, shift, ids, more=more, laws=False)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.observer.kind import Observer
 from drivetwin.shifts.shift import Shift
 
 FloatArray = NDArray[np.float64]
@@ -44,7 +43,6 @@ class Observation:
     """
 
     shift: Shift
-    observer: Observer
     time: FloatArray
     output_torque: Band
     clutch_torque: Mapping[str, Band]

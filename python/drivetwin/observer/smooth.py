@@ -29,7 +29,6 @@ from drivetwin.observer.inputs import (
     is_driving,
     select_uncertain,
 )
-from drivetwin.observer.kind import Observer
 from drivetwin.observer.linear_model import (
     CARRIED,
     LOAD,
@@ -220,7 +219,6 @@ def smooth(twin: Twin, log: ShiftLog, shift: Shift) -> Observation:
     time = 0.5 * (setting.seen.time[1:] + setting.seen.time[:-1])
     return Observation(
         shift,
-        Observer.SMOOTHER,
         time,
         bands.pop("output_torque"),
         bands,

@@ -8,14 +8,7 @@ from dataclasses import dataclass
 
 from drivetwin._util.display_units import NM, RPM, format_significant
 from drivetwin.errors import DrivetwinError
-from drivetwin.gearbox import (
-    CouplingError,
-    Gearbox,
-    GearStatics,
-    Reduction,
-    compare,
-    estimate,
-)
+from drivetwin.gearbox import CouplingError, Gearbox, GearStatics, Reduction, compare
 from drivetwin.report.blocks import Block, TableBlock, TextBlock, make_table
 
 _ROUND_OFF = 1e-12
@@ -29,15 +22,14 @@ class ReducedShift:
     """
 
     reduction: Reduction
-    estimated: CouplingError | None = None
-    simulated: CouplingError | None = None
+    error: CouplingError | None = None
     reason: str = ""
 
 
 def evaluate_reduction(reduction: Reduction) -> ReducedShift:
-    """Estimate the error of a reduction, and simulate it."""
+    """Compute the error of a reduction by simulation."""
     try:
-        return ReducedShift(reduction, estimate(reduction), compare(reduction).error)
+        return ReducedShift(reduction, compare(reduction).error)
     except DrivetwinError as error:
         return ReducedShift(reduction, reason=error.what)
 
@@ -125,19 +117,19 @@ def build_reduction_blocks(found: ReducedShift) -> list[Block]:
 
 def _build_error_block(found: ReducedShift) -> Block:
     exact = found.reduction.exact
-    if exact or found.estimated is None or found.simulated is None:
+    if exact or found.error is None:
         known = "Nothing couples the two shafts: the reduced form is exact." if exact else ""
         reason = f"The error of neglecting M12 is not known: {found.reason}" if found.reason else ""
         return TextBlock(" ".join(filter(None, (known, reason))))
-    rows = []
-    for label, name, unit in (
-        ("shaft torque", "shaft_torque", NM),
-        ("input speed", "input_speed", RPM),
-        ("output speed", "output_speed", RPM),
-    ):
-        sizes = (getattr(each, name) * unit.factor for each in (found.estimated, found.simulated))
-        rows.append((label, *(format_significant(size, 3) for size in sizes), unit.label))
-    columns = ("signal", ("estimated before", "s"), ("simulated", "s"), "unit")
+    rows = [
+        (label, format_significant(getattr(found.error, name) * unit.factor, 3), unit.label)
+        for label, name, unit in (
+            ("shaft torque", "shaft_torque", NM),
+            ("input speed", "input_speed", RPM),
+            ("output speed", "output_speed", RPM),
+        )
+    ]
+    columns = ("signal", ("error", "s"), "unit")
     caption = "Largest error over the reference shift of the card if M12 is neglected."
     return make_table(caption, columns, rows)
 

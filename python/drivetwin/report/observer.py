@@ -20,7 +20,7 @@ def render_observations(found: Sequence[Observation], log: ShiftLog) -> str:
     """HTML text of the page; equal observations give equal text."""
     sections = [_build_section(number, one, log) for number, one in enumerate(found, start=1)]
     title = f"Torques observed in {Path(log.source).name}"
-    return render_page(title, f"by {found[0].observer}, with 95 % bands", sections)
+    return render_page(title, "from speeds and engine torque, with 95 % bands", sections)
 
 
 def _build_section(number: int, one: Observation, log: ShiftLog) -> Section:
@@ -43,8 +43,10 @@ def build_torque_blocks(one: Observation) -> list[Block]:
         *("torque", ("lowest [Nm]", "z.0f"), ("highest [Nm]", "z.0f")),
         *(("± 95 % [Nm]", "z.1f", "mean"), ("± 95 % [Nm]", "z.1f", "largest")),
     )
-    caption = f"Shift {one.shift.name} by {one.observer}"
-    return [make_table(caption, columns, rows), *make_notes("Missing in the log", one.notes)]
+    return [
+        make_table(f"Shift {one.shift.name}", columns, rows),
+        *make_notes("Missing in the log", one.notes),
+    ]
 
 
 BAND_FILL, BAND_EDGE = "rgba(213,94,0,0.28)", "rgba(213,94,0,0.6)"

@@ -132,7 +132,7 @@ def test_a_damaged_file_is_read_or_refused_never_a_crash(
 def test_a_format_is_known_by_its_ending(tmp_path: Path) -> None:
     path = tmp_path / "parameters.xyz"
     path.write_text("", "utf-8")
-    with pytest.raises(InputError, match="use one of ssv, cdfx, dcm, m, json, csv"):
+    with pytest.raises(InputError, match="use one of ssv, cdfx, dcm, m, csv"):
         read_parameters(path)
 
 

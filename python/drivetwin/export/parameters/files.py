@@ -10,7 +10,7 @@ from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.errors import FileFormatError, InputError, Where
-from drivetwin.export.parameters import cdfx, csv_file, dcm, json_file, matlab, ssv
+from drivetwin.export.parameters import cdfx, csv_file, dcm, matlab, ssv
 from drivetwin.export.parameters.content import ParameterSet
 
 
@@ -21,7 +21,6 @@ class ParameterFormat(StrEnum):
     CDFX = "cdfx"
     DCM = "dcm"
     M = "m"
-    JSON = "json"
     CSV = "csv"
 
 
@@ -30,7 +29,6 @@ CODECS = {
     ParameterFormat.CDFX: cdfx.CODEC,
     ParameterFormat.DCM: dcm.CODEC,
     ParameterFormat.M: matlab.CODEC,
-    ParameterFormat.JSON: json_file.CODEC,
     ParameterFormat.CSV: csv_file.CODEC,
 }
 
