@@ -13,7 +13,6 @@ from drivetwin.__main__ import main
 from drivetwin._util import interrupts
 from drivetwin._util.interrupts import (
     defer_interrupts,
-    ignore_interrupts,
     interrupt_on_signals,
     was_interrupted,
 )
@@ -71,20 +70,3 @@ def test_other_failures_of_imports_stay(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(drivetwin.cli, "main", lambda: interrupt_import(None))
     with pytest.raises(ImportError, match="no such module"):
         main()
-
-
-def test_an_ignored_interrupt_stays_ignored() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    interrupt_on_signals()
-    signal.raise_signal(signal.SIGINT)
-    assert not was_interrupted()
-
-
-@ENDING
-def test_signals_are_ignored_for_the_block_alone(number: int) -> None:
-    interrupt_on_signals()
-    with ignore_interrupts():
-        signal.raise_signal(number)
-    assert not was_interrupted()
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(number)

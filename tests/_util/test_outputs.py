@@ -4,108 +4,89 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import tempfile
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import get_type_hints
 
 import pytest
 
-from drivetwin._util.outputs import Output, Shape, select_outputs
+from drivetwin._util.outputs import lock_outputs
+from drivetwin._util.request import COMMANDS, get_arguments
 from drivetwin.cli import main
-from drivetwin.cli.app import COMMANDS
-from drivetwin.cli.command_group import CommandGroup, Entry, LazyCommands, build_command
-from drivetwin.cli.options import bind_command, find_outputs, get_request
-from drivetwin.errors import FileFormatError, InputError
+from drivetwin.errors import InputError
 
-
-def iterate_commands(entries: dict[str, Entry], path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the name and the function of every command."""
-    for name, entry in entries.items():
-        if isinstance(entry, CommandGroup):
-            commands: LazyCommands = entry.commands
-            yield from iterate_commands(dict(commands.entries), f"{name} ")
-        else:
-            yield path + name, entry
-
-
-OUTPUTS = [
-    (name, parameter, function, marker)
-    for name, function in iterate_commands(COMMANDS)
-    for parameter, marker in find_outputs(function).items()
+ARGUMENTS = [
+    (f"{command} {name}", hint, arguments[name])
+    for command, request in COMMANDS.items()
+    for arguments, hints in [(get_arguments(request), get_type_hints(request))]
+    for name, hint in hints.items()
+    if name in arguments
 ]
-NAMES = [f"{name} {parameter}" for name, parameter, _, _ in OUTPUTS]
+OUTPUTS = [pytest.param(one, id=name) for name, _, one in ARGUMENTS if one.output is not None]
 
 
-@pytest.mark.parametrize(("name", "parameter", "function", "marker"), OUTPUTS, ids=NAMES)
-def test_the_root_is_refused_by_every_output_before_the_computation(
-    name: str, parameter: str, function: Any, marker: Output
-) -> None:
+@pytest.mark.parametrize("argument", OUTPUTS)
+def test_the_root_is_refused_by_every_output(argument: object) -> None:
+    output = getattr(argument, "output")  # noqa: B009
     with pytest.raises(InputError) as caught:
-        bind_command(function)(**{parameter: Path("/")})
-    assert caught.value.where.file == "/", name
-    assert marker.shape in ("file", "folder", "file or folder")
+        output.check(Path("/"))
+    assert caught.value.where.file == "/"
 
 
 def test_every_option_that_writes_is_an_output() -> None:
     """Options that write are `-o`, and those whose help has the words."""
-    unmarked = []
-    for name, function in iterate_commands(COMMANDS):
-        marked, hints = find_outputs(function), get_type_hints(get_request(function))
-        for option in build_command(name, function).params:
-            text = (getattr(option, "help", None) or "").casefold()
-            written = "-o" in option.opts or "write" in text.split()
-            takes_path = "Path" in str(hints.get(option.name))
-            if written and takes_path and option.name not in marked:
-                unmarked.append(f"{name} {option.opts}")
-    assert unmarked == []
+    for name, hint, one in ARGUMENTS:
+        if "Path" in str(hint) and ("-o" in one.names or "write" in one.help.casefold().split()):
+            assert one.output is not None, name
     assert len(OUTPUTS) >= 17
 
 
-def test_a_path_that_takes_no_file_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "file.csv"
-    file.touch()
-    for marker, path, text in (
-        (Output(), tmp_path, "this is a folder, not a file"),
-        (Output(), file / "a.csv", "is a file, so nothing can be in it"),
-        (Output(), file / "deep" / "a.csv", "is a file, so nothing can be in it"),
-        (Output(Shape.FOLDER), file, "this is a file, not a folder"),
-        (Output(Shape.FOLDER), file / "out", "is a file, so nothing can be in it"),
-        (Output(Shape.EITHER), Path(), "names no file"),
-        (Output(Shape.FOLDER), Path("/.."), "root of the file system"),
-        (Output(), Path("/dev/null"), "a device"),
-        (Output(endings={".csv": "table", ".html": "page"}), tmp_path / "a.CSVX", "'.CSVX'"),
-    ):
-        with pytest.raises(InputError, match=text):
-            marker.check(path)
-    for marker, path in (
-        (Output(), file),
-        (Output(endings={".csv": "table"}), tmp_path / "new" / "a.CSV"),
-        (Output(Shape.FOLDER), tmp_path),
-        (Output(Shape.FOLDER), tmp_path / "new" / "deep"),
-        (Output(Shape.EITHER), tmp_path / "new"),
-    ):
-        marker.check(path)
+@pytest.mark.parametrize(
+    ("command", "path", "text"),
+    [
+        ("synth", "", "this is a folder, not a file"),
+        ("synth", "file.csv/a.csv", "is a file, so nothing can be in it"),
+        ("synth", "file.csv/deep/a.csv", "is a file, so nothing can be in it"),
+        ("synth", "a.CSVX", "no format has the ending '.CSVX'"),
+        ("synth", "log.xlsx", ".mf4 (MDF 4)"),
+        ("synth", "plain", "no format has the ending ''"),
+        ("synth", "locked/new/a.csv", "no permission to write in"),
+        ("gearbox three-set-3000", "/dev/null", "a device"),
+        ("demo", "file.csv", "this is a file, not a folder"),
+        ("demo", "file.csv/out", "is a file, so nothing can be in it"),
+        ("demo", "/..", "root of the file system"),
+        ("demo", "locked/new/a", "no permission to write in"),
+    ],
+)
+def test_a_path_that_takes_no_output_is_refused(
+    command: str,
+    path: str,
+    text: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "file.csv").touch()
+    (tmp_path / "locked").mkdir()
+    monkeypatch.setattr(os, "access", lambda place, _: Path(place) != tmp_path / "locked")
+    assert main([*command.split(), "-o", str(tmp_path / path)]) == 2
+    assert text in capsys.readouterr().err
 
 
-def test_a_folder_without_permission_is_refused(
+def test_the_second_writer_is_told_and_may_come_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(os, "access", lambda path, _: Path(path) != tmp_path)
-    for shape in Shape:
-        with pytest.raises(InputError, match="no permission to write in"):
-            Output(shape).check(tmp_path / "new" / "a")
-
-
-def test_an_unknown_ending_names_the_kinds(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["synth", "-o", "log.xlsx"]) == 2
-    shown = capsys.readouterr()
-    assert "log.xlsx: no format has the ending '.xlsx'" in shown.err
-    assert ".mf4 (MDF 4)" in shown.err
-    with pytest.raises(FileFormatError):
-        Output(endings={".csv": "table"}).check(Path("plain"))
-
-
-def test_outputs_are_selected_by_ending_in_any_case() -> None:
-    paths = [Path("a.CSV"), Path("b.html"), Path("c.csv")]
-    assert select_outputs(paths, ".csv") == [paths[0], paths[2]]
-    assert select_outputs(None, ".csv") == []
+    (locks := tmp_path / "locks").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(locks))
+    with lock_outputs([tmp_path / "out"]):
+        assert len(list(locks.iterdir())) == 1
+        with (
+            pytest.raises(InputError, match="another command is writing"),
+            lock_outputs([tmp_path / "other", tmp_path / "x" / ".." / "out"]),
+        ):
+            pass
+        with lock_outputs([tmp_path / "other"]):
+            pass
+    with lock_outputs([tmp_path / "out"]):
+        pass
+    assert list(locks.iterdir()) == []

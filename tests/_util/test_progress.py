@@ -1,18 +1,80 @@
 # SPDX-License-Identifier: MIT
-"""Progress: shares of nested parts, never falling, and cancelled by the listener."""
+"""Progress: shares of nested parts and of named stages, by the measured table of all stages."""
 
 from __future__ import annotations
+
+import importlib
+import pkgutil
+import tomllib
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.progress import attach_listener, notify_progress, scale_progress
+import drivetwin
+from drivetwin._util import progress
+from drivetwin._util.progress import (
+    TABLE,
+    TimedStages,
+    attach_listener,
+    notify_progress,
+    scale_progress,
+)
+
+STAGES = TimedStages("work", ("read", "fit", "write"))
 
 
-def test_nothing_happens_without_a_listener() -> None:
-    with scale_progress(0.0, 0.5, "alone"):
-        notify_progress(0.3)
+@pytest.fixture
+def seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = {"work": {"read": 1.0, "fit": 6.0, "write": 3.0}, "fit": {"a": 1.0, "b": 2.0}}
+    monkeypatch.setattr(progress, "_read_table", lambda: table)
+
+
+@pytest.mark.usefixtures("seconds")
+def test_a_stage_has_its_share_of_the_measured_seconds() -> None:
+    assert STAGES.compute_span("read") == pytest.approx((0.0, 0.1))
+    assert STAGES.compute_span("fit") == pytest.approx((0.1, 0.7))
+    assert STAGES.compute_span("write") == pytest.approx((0.7, 1.0))
+
+
+@pytest.mark.usefixtures("seconds")
+def test_repeated_stages_and_stages_left_out() -> None:
+    twice = STAGES.repeat("fit", 2)
+    assert twice.compute_span("fit", 1) == pytest.approx((7.0 / 16.0, 13.0 / 16.0))
+    assert STAGES.repeat("fit", 0).compute_span("write") == (0.25, 1.0)
+
+
+@pytest.mark.usefixtures("seconds")
+def test_stages_nest() -> None:
+    heard: list[float] = []
+    inner = TimedStages("fit", ("a", "b"))
+    with attach_listener(lambda share, _: heard.append(share)):
+        with STAGES.enter("read"):
+            pass
+        with STAGES.enter("fit"), inner.enter("b"):
+            notify_progress(0.5)
+    assert heard[-3] == pytest.approx(0.1 + 0.6 * (1.0 + 0.5 * 2.0) / 3.0)
+    assert heard[-1] == pytest.approx(0.7)
+
+
+def _find_declared() -> Iterator[TimedStages]:
+    for module in pkgutil.walk_packages(drivetwin.__path__, "drivetwin."):
+        if module.name.endswith(("__main__", "_native")):
+            continue
+        for value in vars(importlib.import_module(module.name)).values():
+            for one in value.values() if isinstance(value, dict) else (value,):
+                if isinstance(one, TimedStages):
+                    yield one
+
+
+def test_the_table_has_all_declared_stages_and_no_other() -> None:
+    table = tomllib.loads(TABLE.read_text(encoding="utf-8"))
+    declared = {one.computation: set(one.names) for one in _find_declared()}
+    assert {name: set(stages) for name, stages in table.items()} == declared
+    for name, stages in table.items():
+        assert all(seconds >= 0.0 for seconds in stages.values())
+        assert sum(stages.values()) > 0.0, name
 
 
 def test_parts_have_their_place_in_the_whole() -> None:
@@ -25,14 +87,6 @@ def test_parts_have_their_place_in_the_whole() -> None:
     assert (0.25, "first") in heard
     assert (0.625, "second") in heard
     assert heard[-1] == (1.0, "second")
-
-
-def test_a_listener_hears_nothing_after_its_block() -> None:
-    heard: list[float] = []
-    with attach_listener(lambda share, _: heard.append(share)):
-        pass
-    notify_progress(0.5)
-    assert heard == []
 
 
 def test_a_listener_cancels_by_raising() -> None:

@@ -10,20 +10,18 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin._util.regular_file import measure_regular_file
+from drivetwin import load_card, load_twin
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError, FileFormatError
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
 from drivetwin.export.parameters.template import read_template
 from drivetwin.files.result_file import load_result
-from drivetwin.files.twin_file import read_twin_file
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.sources import Sources
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.formats.can.database import read_database
 from drivetwin.logs.read import read_raw
-from drivetwin.vehicle.card import load_card
 
 READERS: tuple[Callable[[Path], object], ...] = (
     read_raw,
@@ -32,7 +30,7 @@ READERS: tuple[Callable[[Path], object], ...] = (
     load_gearbox,
     load_powertrain,
     read_rules,
-    read_twin_file,
+    load_twin,
     load_result,
     lambda path: read_database((path,)),
     lambda path: Sources([], path).count(),
@@ -52,15 +50,6 @@ SPECIAL: dict[str, Callable[[Path], object]] = {
     "a socket": make_socket,
     "a device": lambda path: path.symlink_to("/dev/zero"),
 }
-
-
-def test_the_size_of_a_regular_file(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_bytes(b"1234")
-    link = tmp_path / "b.csv"
-    link.symlink_to(path)
-    assert measure_regular_file(path, FileFormatError) == 4
-    assert measure_regular_file(link, FileFormatError) == 4
 
 
 @pytest.mark.parametrize("kind", SPECIAL)

@@ -56,17 +56,6 @@ def test_kind_and_phases_hold_without_pressures_and_torque_sensor(
     assert full.sigma["lockup"] < 2e-3
 
 
-def test_the_vibration_dose_needs_a_torque_sensor(
-    recording: tuple[ShiftLog, VehicleCard, ShiftKind],
-) -> None:
-    log, card, _ = recording
-    (shift,), _ = detect_shifts(log, card)
-    assert shift.quality["vibration_dose"] > 0.0
-    bare = {role: c for role, c in log.channels.items() if role != "output_torque"}
-    (shift,), _ = detect_shifts(replace(log, channels=bare), card)
-    assert "vibration_dose" not in shift.quality
-
-
 def test_friction_work_is_told_where_the_on_coming_element_carries_the_torque(
     recording: tuple[ShiftLog, VehicleCard, ShiftKind],
 ) -> None:

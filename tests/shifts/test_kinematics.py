@@ -8,8 +8,7 @@ import pytest
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
-from drivetwin.errors import MissingChannelError
-from drivetwin.shifts.kinematics import get_shift_pressures, is_shared_pressure
+from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 
@@ -31,23 +30,8 @@ def _log(**columns: tuple[str, object]) -> ShiftLog:
 
 def test_one_column_belongs_to_each_element_in_turn() -> None:
     log = _log(K2=("P", PRESSURE), K3=("P", PRESSURE))
-    assert is_shared_pressure(log, "K2", "K3")
     parts = get_shift_pressures(log, SHIFT)
     assert parts["K2"].values + parts["K3"].values == pytest.approx(PRESSURE)
     assert parts["K2"].values[TIME > 2.4].max() == 0.0
     assert parts["K3"].values[TIME < 2.2].max() == 0.0
     assert parts["K3"].role == "pressure.K3"
-
-
-def test_two_columns_stay_as_they_are() -> None:
-    log = _log(K2=("P2", PRESSURE), K3=("P3", PRESSURE[::-1]))
-    assert not is_shared_pressure(log, "K2", "K3")
-    parts = get_shift_pressures(log, SHIFT)
-    assert parts["K2"] is log.get_pressure("K2")
-    assert parts["K3"] is log.get_pressure("K3")
-
-
-def test_a_missing_pressure_is_named() -> None:
-    with pytest.raises(MissingChannelError, match=r"pressure\.K3"):
-        get_shift_pressures(_log(K2=("P2", PRESSURE)), SHIFT)
-    assert not is_shared_pressure(_log(K2=("P2", PRESSURE)), "K2", "K3")

@@ -8,23 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivetwin import detect_shifts, identify
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import IdentificationError
-from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.lockup_clutch import (
-    LETS_GO,
-    check_lockup_observed,
-    compute_mean_slip,
     detect_lock_ups,
     find_open_spans,
     refer_to_turbine,
-    require_locked_converter,
 )
 from drivetwin.simulation.added_elements import Converter
 from tests.shifts.fixtures import Plan, make_card
 from tests.support.arrays import FloatArray
 
+LETS_GO = 0.3
+"""Time around an opening that is left out, s."""
 TIME = np.arange(0.0, 6.0, 0.02)
 INLET = 120.0 + 5.0 * TIME
 PLAN = Plan(gears=(("2", 1.91), ("3", 1.43)), break_aways=(1.5,))
@@ -55,24 +53,10 @@ def test_the_flag_tells_when_and_the_speeds_agree() -> None:
     assert found.warning == ""
 
 
-def test_a_flag_that_lies_is_told() -> None:
-    (found,) = detect_lock_ups(log(closing(9.0), (TIME > 2.0).astype(np.float64)), CARD)
-    assert "differ by 12.0 %" in found.warning
-
-
 def test_without_a_flag_the_speeds_tell() -> None:
     (found,) = detect_lock_ups(log(closing(2.0)), CARD)
     assert abs(found.time - 2.0) < 4.0 * found.sigma
     assert found.end > 5.9
-
-
-def test_a_late_engine_speed_is_no_opening() -> None:
-    made = PLAN.log()
-    inlet = made["input_speed"]
-    late = replace(inlet, role="engine_speed", time=inlet.time + 0.03)
-    assert (
-        detect_lock_ups(replace(made, channels={**made.channels, "engine_speed": late}), CARD) == ()
-    )
 
 
 def test_the_speeds_tell_where_it_is_open() -> None:
@@ -97,23 +81,14 @@ def test_closed_throughout_is_no_event() -> None:
     assert detect_lock_ups(log(INLET, np.ones(TIME.size)), CARD) == ()
 
 
-def test_mean_slip() -> None:
-    assert compute_mean_slip(log(1.05 * INLET), CARD, (1.0, 3.0)) == pytest.approx(0.05)
-    assert compute_mean_slip(ShiftLog({}, "made", ""), CARD, (1.0, 3.0)) is None
-
-
 def test_a_shift_with_an_open_converter_is_refused() -> None:
-    (shift,), _ = detect_shifts(PLAN.log(), PLAN.card())
     made = PLAN.log()
+    found = detect_shifts(made, PLAN.card())
     inlet = made["input_speed"]
-    for factor, refused in ((1.0, False), (1.05, True)):
-        engine = replace(inlet, role="engine_speed", values=factor * inlet.values)
-        whole = replace(made, channels={**made.channels, "engine_speed": engine})
-        if refused:
-            with pytest.raises(IdentificationError, match=r"converter is open.*5\.0 %"):
-                require_locked_converter(whole, PLAN.card(), shift)
-        else:
-            require_locked_converter(whole, PLAN.card(), shift)
+    engine = replace(inlet, role="engine_speed", values=1.05 * inlet.values)
+    whole = replace(made, channels={**made.channels, "engine_speed": engine})
+    with pytest.raises(IdentificationError, match=r"converter is open.*5\.0 %"):
+        identify(whole, PLAN.card(), found)
 
 
 def test_with_a_map_the_turbine_stands_for_the_engine() -> None:
@@ -125,7 +100,6 @@ def test_with_a_map_the_turbine_stands_for_the_engine() -> None:
     for factor in (1.25, 1.0):
         engine = replace(inlet, role="engine_speed", values=factor * inlet.values)
         whole = replace(made, channels={**made.channels, "engine_speed": engine})
-        require_locked_converter(whole, card, shift)
         found = refer_to_turbine(whole, card, shift)
         if factor == 1.0:
             assert found is whole
@@ -193,19 +167,3 @@ def test_a_map_that_ends_short_of_the_shift_is_refused() -> None:
     # Beyond the shift the torque is merely unknown.
     late = behind(np.where(time > time[-1] - 0.5, -0.2, 0.25))["engine_torque"].time
     assert late[-1] == pytest.approx(time[-1] - 0.5, abs=0.01)
-
-
-def test_a_converter_that_no_channel_shows_is_told() -> None:
-    card = replace(CARD, converter=CONVERTER)
-    assert check_lockup_observed(log(INLET), card) == ()
-    blind = ShiftLog({"input_speed": log(INLET)["input_speed"]}, "made", "")
-    assert check_lockup_observed(blind, CARD) == ()
-    (one,) = check_lockup_observed(blind, card)
-    assert "no engine_speed" in one.text
-    flag = log(INLET, np.ones(TIME.size))["lockup_engaged"]
-    assert (
-        check_lockup_observed(
-            replace(blind, channels={**blind.channels, "lockup_engaged": flag}), card
-        )
-        == ()
-    )

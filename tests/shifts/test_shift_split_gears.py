@@ -43,11 +43,6 @@ def test_each_instant_is_one_shifts_own() -> None:
     assert np.array_equal(left, np.arange(0.0, 14.25, 0.5))
 
 
-def test_a_single_shift_keeps_all_samples() -> None:
-    (own,) = compute_exclusive_masks(CHAIN[:1], [np.linspace(-1.0, 20.0, 30)])
-    assert own.all()
-
-
 def test_a_gear_of_which_less_counts_is_not_divided() -> None:
     one, other = shift(2.0, 3.0, (0.0, 6.0)), shift(20.0, 21.0, (12.0, 24.0))
     assert compute_exclusive_spans((one, other)) == ((0.0, 6.0), (12.0, 24.0))

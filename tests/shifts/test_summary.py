@@ -8,11 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.findings import Code, report
-from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.summary import (
-    collect_findings,
-    collect_rejected,
     compare_drives,
     summarize_shifts,
 )
@@ -103,31 +100,3 @@ def test_two_software_states_are_compared_by_kind_and_gears() -> None:
     (few,) = compare_drives(first, slower[:2])
     assert few.differs is None
     assert compare_drives(first, other) == ()
-
-
-def test_a_figure_that_some_shifts_lack_is_of_the_others() -> None:
-    (group,) = summarize_shifts([_make(2, 1.0, 0.4), replace(_make(2, 2.0, 0.5), quality={})])
-    assert (group.count, group.figures["shift_time"].count) == (2, 1)
-    assert summarize_shifts([]) == ()
-
-
-def test_findings_are_counted_once_for_each_kind_and_gear() -> None:
-    unknown = report(Code.POWER_STATE_UNKNOWN)
-    third, fourth = (
-        report(Code.RATIO_DEVIATES, gear=gear, ratio=1.0, card=1.1) for gear in ("3", "4")
-    )
-    shifts = [
-        replace(_make(2, 1.0, 0.4), findings=(unknown, third)),
-        replace(_make(3, 2.0, 0.4), findings=(unknown, third, fourth)),
-    ]
-    found = [(one.code, one.names.get("gear"), labels) for one, labels in collect_findings(shifts)]
-    assert found == [
-        (Code.POWER_STATE_UNKNOWN, None, ("2→3", "3→4")),
-        (Code.RATIO_DEVIATES, "3", ("2→3", "3→4")),
-        (Code.RATIO_DEVIATES, "4", ("3→4",)),
-    ]
-
-
-def test_rejections_are_counted_by_reason() -> None:
-    rejected = [RejectedShift((t, t + 1.0), why) for t, why in ((0.0, "a"), (2.0, "b"), (4.0, "a"))]
-    assert collect_rejected(rejected) == ((rejected[0], 2), (rejected[1], 1))

@@ -12,7 +12,6 @@ from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.findings import render
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.shifts.tcu_flags import find_flag_spans
 from tests.shifts.fixtures import Plan
 from tests.support.arrays import FloatArray
 
@@ -31,23 +30,8 @@ def flag(*spans: tuple[float, float]) -> FloatArray:
     return np.array([float(any(low <= t <= high for low, high in spans)) for t in TIME])
 
 
-def test_a_single_wrong_frame_is_no_change_of_a_flag() -> None:
-    values = flag((1.0, 1.5))
-    values[[30, 120, 300]] = 1.0 - values[[30, 120, 300]]
-    (channel,) = states(shift_in_process=values).values()
-    (span,) = find_flag_spans(channel)
-    assert span == pytest.approx((1.0, 1.5))
-
-
 def with_states(log: ShiftLog, **values: FloatArray) -> ShiftLog:
     return replace(log, channels={**log.channels, **states(**values)})
-
-
-def test_spans_of_a_flag() -> None:
-    (channel,) = states(shift_in_process=flag((0.0, 0.2), (1.0, 1.5), (3.9, 4.0))).values()
-    assert np.array(find_flag_spans(channel)) == pytest.approx(
-        np.array([(0.0, 0.2), (1.0, 1.5), (3.9, 3.99)])
-    )
 
 
 def test_agreeing_flags_add_nothing() -> None:
