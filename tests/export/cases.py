@@ -8,11 +8,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
+from drivetwin.export.c.write import write_c
+from drivetwin.export.compiler import detect_platform
+from drivetwin.export.fixed_step import run_fixed_step
+from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.input_delays import InputDelays
+from drivetwin.export.modelica.model import write_modelica
 from drivetwin.export.subject import Subject, compute_steady_start
+from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import (
     DualClutch,
     RoadLoad,
@@ -20,6 +28,7 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
     Stribeck,
+    Trajectory,
 )
 from reference.dual_clutch_upshift.problem import DAMPING, FINAL_DRIVE, START, STIFFNESS, WET
 from reference.problem import ROOT, load
@@ -28,6 +37,36 @@ from tests.support.arrays import FloatArray
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "reference"
 STEP = 1e-3
+ON_A_PLATFORM_OF_FMI = pytest.mark.skipif(
+    detect_platform() is None, reason="FMI names no platform like this one"
+)
+
+
+def run_core(
+    model: DualClutch,
+    start: State,
+    time: FloatArray,
+    inputs: FloatArray,
+    kind: InputKind = InputKind.LINEAR,
+    delays: InputDelays | None = None,
+) -> Trajectory:
+    """Run the core as importers with fixed steps do; `inputs` (n, 3)."""
+    return run_fixed_step(model, start, time, inputs, kind, delays or InputDelays())
+
+
+def write_model(subject: Subject, experiment: Experiment | None = None) -> str:
+    """Write the Modelica package of a subject and return its text."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "model.mo"
+        write_modelica(subject, experiment, path)
+        return path.read_text("utf-8")
+
+
+def write_source(subject: Subject) -> str:
+    """Write the C sources and return the text of the file of the twin."""
+    with TemporaryDirectory() as folder:
+        write_c(subject, Path(folder))
+        return (Path(folder) / "dt_twin.c").read_text("utf-8")
 
 
 @dataclass(frozen=True)

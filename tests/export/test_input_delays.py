@@ -11,18 +11,20 @@ import numpy as np
 import pytest
 
 from drivetwin.export.c.loaded import CModel
-from drivetwin.export.c.write import generate_twin_source
-from drivetwin.export.compiler import detect_platform
-from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.build import BuildOptions, build_fmu
 from drivetwin.export.fmu.experiment import Experiment
-from drivetwin.export.fmu.variables import list_variables
-from drivetwin.export.input_delays import ACTING_INPUTS, InputDelays
-from drivetwin.export.modelica.model import format_modelica
+from drivetwin.export.input_delays import InputDelays
 from drivetwin.export.subject import Subject, build_note
 from drivetwin.export.targets import FmiVersion, InputKind
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
-from tests.export.cases import CASES, STEP, Case
+from tests.export.cases import (
+    CASES,
+    ON_A_PLATFORM_OF_FMI,
+    STEP,
+    Case,
+    run_core,
+    write_model,
+    write_source,
+)
 from tests.export.fmu.test_build import Instance
 from tests.export.modelica.compiled import run as run_modelica
 from tests.export.parameters.sample import twin
@@ -61,19 +63,14 @@ def test_the_model_waits_for_the_latest_input(
 def test_every_form_describes_the_delays_inside() -> None:
     delays = OLD_TORQUE
     subject = replace(CASES["tie_up"]().subject, delays=delays, note=build_note(twin(), delays))
-    texts = {one.name: one.meaning for one in list_variables(subject)}
-    assert texts["engine_torque"].endswith("as logged")
-    assert texts["B3.pressure"].endswith("as logged, delayed by 0.0263 s in the model")
-    for name in ("output_torque", "engine_speed", "B2.slip", "B2.mode"):
-        assert texts[name].endswith("0.0263 s later than the motion")
-    source, model = generate_twin_source(subject), format_modelica(subject)
+    source, model = write_source(subject), write_model(subject)
     for text in (source, model):
         assert "outputs 0.0263 s later than the motion" in text
         assert "advance the logged signal" not in text
     assert ".pressure = DT_C(0.0263)" in source
     assert "delay(u_B3, 0.0263)" in model
     assert "delay(u_engine_torque" not in model
-    assert "delay(" not in format_modelica(replace(subject, delays=InputDelays(0.0213)))
+    assert "delay(" not in write_model(replace(subject, delays=InputDelays(0.0213)))
 
 
 def _swing(name: str) -> Case:
@@ -89,7 +86,7 @@ def _run_shifted(case: Case, delays: InputDelays, time: FloatArray) -> FloatArra
     columns = zip(case.inputs.T, lines, strict=True)
     inputs = np.column_stack([np.interp(time - line, case.time, u) for u, line in columns])
     subject = case.subject
-    run = run_fixed_step(subject.model, subject.start, time, inputs, InputKind.LINEAR)
+    run = run_core(subject.model, subject.start, time, inputs, InputKind.LINEAR)
     assert run.status == "completed"
     return run.shaft_torque
 
@@ -120,10 +117,10 @@ def test_c_and_core_have_the_same_delay_lines(delays: InputDelays, kind: InputKi
     subject = case.subject
     model = CModel(replace(subject, delays=delays))
     run = model.run(case.time, case.inputs, hold=kind is InputKind.HOLD)
-    core = run_fixed_step(subject.model, subject.start, case.time, case.inputs, kind, delays)
+    core = run_core(subject.model, subject.start, case.time, case.inputs, kind, delays)
     deviation = np.abs(run.columns["output_torque"] - core.shaft_torque).max()
     assert deviation < 1e-9 * np.abs(core.shaft_torque).max()
-    plain = run_fixed_step(subject.model, subject.start, case.time, case.inputs, kind)
+    plain = run_core(subject.model, subject.start, case.time, case.inputs, kind)
     assert np.abs(plain.shaft_torque - core.shaft_torque).max() > 1.0
 
 
@@ -132,12 +129,10 @@ def test_modelica_delays_its_inputs(tmp_path: Path) -> None:
     first = int(np.argmax(np.abs(np.diff(case.inputs[:, 2])) > 0.0))
     time, inputs = case.time[: first + 150] - case.time[0], case.inputs[: first + 150]
     short = replace(case, time=time, inputs=inputs)
-    names = (ENGINE_TORQUE, "B2", "B3")
-    signals = {name: Signal(time, u) for name, u in zip(names, inputs.T, strict=True)}
-    span = (float(time[0]), float(time[-1]))
-    text = format_modelica(replace(case.subject, delays=delays), signals, span)
+    experiment = Experiment("swing", time, inputs, STEP)
+    text = write_model(replace(case.subject, delays=delays), experiment)
     found = -run_modelica(text, time, ("output_shaft.tau",), tmp_path)["output_shaft.tau"]
-    late, early = (_run_shifted(short, one, time) for one in (delays, ACTING_INPUTS))
+    late, early = (_run_shifted(short, one, time) for one in (delays, InputDelays()))
     scale = np.abs(late).max()
     assert np.abs(late - early).max() > 0.02 * scale
     assert np.abs(found - late).max() < 2e-3 * scale
@@ -157,10 +152,16 @@ def _delay(case: Case) -> Subject:
     return replace(case.subject, delays=LATE_PRESSURE)
 
 
-@pytest.mark.skipif(detect_platform() is None, reason="FMI names no platform like this one")
+@ON_A_PLATFORM_OF_FMI
 def test_fmu_delays_its_inputs_and_saves_the_lines(delayed: Path) -> None:
     """A restored or reset instance goes on as one that never left."""
     case = _swing("dual_clutch_upshift")
+    texts = {
+        one.name: one.description
+        for one in fmpy.read_model_description(str(delayed)).modelVariables
+    }
+    assert texts["engine_torque"].endswith("as logged, delayed by 0.003 s in the model")
+    assert texts["B3.pressure"].endswith("as logged, delayed by 0.0452 s in the model")
     instance = Instance(delayed, fmpy.extract(str(delayed)))
     instance.initialize(case.inputs[0])
     begin = instance.run(case, 0, 600)
@@ -168,7 +169,7 @@ def test_fmu_delays_its_inputs_and_saves_the_lines(delayed: Path) -> None:
     packed = instance.fmu.serializeFMUState(saved)
     rest = instance.run(case, 600, 900)
     kind = InputKind.LINEAR if instance.is_fmi2 else InputKind.HOLD
-    core = run_fixed_step(
+    core = run_core(
         case.subject.model, case.subject.start, case.time, case.inputs, kind, LATE_PRESSURE
     )
     told = np.concatenate((begin, rest))[:, 1]
@@ -184,7 +185,7 @@ def test_fmu_delays_its_inputs_and_saves_the_lines(delayed: Path) -> None:
     instance.free()
 
 
-@pytest.mark.skipif(detect_platform() is None, reason="FMI names no platform like this one")
+@ON_A_PLATFORM_OF_FMI
 def test_inputs_first_set_after_initialization_have_no_history(delayed: Path) -> None:
     """Importers may leave inputs at zero until the first step: no clutch opens for that."""
     case = _swing("dual_clutch_upshift")

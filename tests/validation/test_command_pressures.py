@@ -11,16 +11,13 @@ import pytest
 
 import drivetwin
 from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.errors import MissingChannelError, MissingParameterError
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.command_pressures import replace_pressures
 from tests.report.sample import card, identification
 
 
@@ -38,38 +35,6 @@ def log(bench: DynoRun) -> ShiftLog:
 def twin(bench: DynoRun) -> Twin:
     made = {n: IdentifiedActuator.from_design(m) for n, m in bench.truth.actuators.items()}
     return replace(build_twin(identification(), card()), actuators=made)
-
-
-def test_pressures_are_those_that_were_measured(twin: Twin, log: ShiftLog) -> None:
-    replaced, elements = replace_pressures(twin, log)
-    assert elements == ("B2", "B3")
-    for name in elements:
-        role = make_pressure_role(name)
-        measured = log[role]
-        left = replaced[role].interpolate(measured.time) - measured.values
-        assert np.sqrt(np.nanmean(left**2)) == pytest.approx(7e3, rel=0.05)  # the sensor's noise
-    assert replaced["output_torque"] is log["output_torque"]
-
-
-def test_an_element_without_a_command_keeps_its_measured_pressure(
-    twin: Twin, log: ShiftLog
-) -> None:
-    role = make_command_role("B2")
-    part = replace(log, channels={r: one for r, one in log.channels.items() if r != role})
-    replaced, elements = replace_pressures(twin, part)
-    assert elements == ("B3",)
-    assert replaced[make_pressure_role("B2")] is log[make_pressure_role("B2")]
-
-
-def test_a_twin_without_actuators_is_refused(twin: Twin, log: ShiftLog) -> None:
-    with pytest.raises(MissingParameterError, match="no model of an actuator"):
-        replace_pressures(replace(twin, actuators={}), log)
-
-
-def test_a_log_without_commands_is_refused(twin: Twin, log: ShiftLog) -> None:
-    channels = {role: one for role, one in log.channels.items() if "command" not in role}
-    with pytest.raises(MissingChannelError, match=r"pressure_command\.B2"):
-        replace_pressures(twin, replace(log, channels=channels))
 
 
 def test_a_log_without_pressures_is_simulated_from_its_commands(

@@ -16,18 +16,12 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.validation import compute_fit
 from drivetwin.findings import render
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
-from drivetwin.validation.initial_state import estimate_start_state
 from drivetwin.validation.simulate_log import (
-    EXTRA_SIGNALS,
-    attach_fit,
     attach_validation,
-    pool_fits,
-    replace_run,
     simulate_shift,
 )
 from drivetwin.vehicle.shift_kind import ShiftKind
@@ -187,52 +181,6 @@ def test_leaving_the_validity_range_warns(twin: Twin, log: ShiftLog, shift: Shif
     assert "range of slip" in warning
 
 
-def test_the_slip_of_an_open_element_leaves_no_range(
-    twin: Twin, log: ShiftLog, shift: Shift
-) -> None:
-    run = simulate_shift(twin, log, shift).trajectory
-    seen = float(np.abs(run.slip[shift.oncoming]).max())
-    open_speed = 3.0 * seen
-    slip = {name: one.copy() for name, one in run.slip.items()}
-    slip[shift.offgoing][run.clutch_torque[shift.offgoing] == 0.0] = open_speed
-    assert (slip[shift.offgoing] == open_speed).any()
-    covered = replace(twin, validity={"slip": (0.0, seen)})
-    before = simulate_shift(covered, log, shift)
-    assert render(replace_run(before, covered, log, replace(run, slip=slip)).findings) == ()
-
-
-def test_the_log_behind_a_twin_leaves_no_range_of_it(
-    twin: Twin, log: ShiftLog, shift: Shift
-) -> None:
-    narrow = replace(twin, validity={"slip": (0.0, 20.0)})
-    one = simulate_shift(narrow, log, shift)
-    assert render(one.findings)
-    assert render(attach_fit(identification(), [one]).findings) == render(identification().findings)
-    failed = replace(one, trajectory=replace(one.trajectory, status="events too dense"))
-    assert "ended early" in render(attach_fit(identification(), [failed]).findings)[-1]
-    speed = one.traces["input_speed"]
-    astray = {**one.traces, "input_speed": replace(speed, simulated=2.0 * speed.simulated)}
-    told = render(attach_fit(identification(), [replace(one, traces=astray)]).findings)
-    shift = one.shift
-    name = f"shift {shift.start_gear}-{shift.end_gear} at {shift.lockup_time:.2f} s"
-    assert told[-1].startswith(f"{name}: Simulated input speed ranges from")
-
-
-def test_start_state_keeps_the_gear_and_the_measured_twist(
-    truth: dict[str, Any], twin: Twin, log: ShiftLog, shift: Shift
-) -> None:
-    model = twin.build_dual_clutch(shift)
-    state = estimate_start_state(model, log, shift, 0.0)
-    initial = truth["initial"]
-    assert state.engine_speed / state.output_speed == pytest.approx(twin.get_gear("2").ratio)
-    assert state.engine_speed == pytest.approx(initial["omega_e"], abs=5e-3)
-    assert state.wheel_speed == pytest.approx(initial["omega_w"], abs=1e-3)
-    assert state.twist == pytest.approx(initial["twist"], rel=1e-3)
-    without = replace(log, channels={k: c for k, c in log.channels.items() if k != "output_torque"})
-    guessed = estimate_start_state(model, without, shift, 0.0)
-    assert guessed.twist == pytest.approx(initial["twist"], rel=0.1)
-
-
 def _until(log: ShiftLog, role: str, end: float) -> ShiftLog:
     """The log with one channel that stops at `end` [s]."""
     one = log[role]
@@ -262,16 +210,6 @@ def test_further_speeds_are_compared_but_no_part_of_the_fit(
     assert set(found.fit) == set(found.traces) == {"output_torque", "input_speed", "output_speed"}
     for trace in found.extra_traces.values():
         assert np.abs(trace.measured - trace.simulated).max() < 0.01 * np.abs(trace.measured).max()
-    pooled = pool_fits([found], EXTRA_SIGNALS)
-    assert all(fits["all"].fit_percent > 90.0 for fits in pooled.values())
-
-
-def test_a_speed_that_stands_in_for_a_compared_one_is_shown_once(
-    twin: Twin, log: ShiftLog, shift: Shift
-) -> None:
-    engine = replace(log["input_speed"], role="engine_speed")
-    both = replace(log, channels={**log.channels, "engine_speed": engine})
-    assert set(simulate_shift(twin, both, shift).extra_traces) == {"wheel_speed"}
 
 
 def test_a_torque_that_stopped_before_the_shift_is_named(
@@ -283,23 +221,6 @@ def test_a_torque_that_stopped_before_the_shift_is_named(
     told = attach_validation(replace(identification(), shifts=(shift,)), twin, stopped)
     assert told.fit == {}
     assert "No validation: 'T_o_Nm'" in render(told.findings)[-1]
-
-
-def test_fit_percent_is_measured_against_the_mean_of_the_whole_log() -> None:
-    measured = np.array([1.0, 3.0])
-    fit = compute_fit(measured, np.array([2.0, 3.0]), mean=0.0)
-    assert fit.rmse == pytest.approx(np.sqrt(0.5))
-    assert fit.fit_percent == pytest.approx(100.0 * (1.0 - 1.0 / np.sqrt(10.0)))
-    assert np.isnan(compute_fit(np.empty(0), np.empty(0), 0.0).rmse)
-    assert np.isnan(compute_fit(np.ones(3), np.ones(3), 1.0).fit_percent)
-
-
-def test_fits_of_several_shifts_are_pooled(twin: Twin, log: ShiftLog, shift: Shift) -> None:
-    one = simulate_shift(twin, log, shift)
-    found = attach_fit(identification(), [one, one])
-    pooled = found.fit["output_torque"]["inertia"]
-    assert pooled.rmse == pytest.approx(one.fit["output_torque"]["inertia"].rmse)
-    assert len(found.evidence.validation) == 2
 
 
 def test_incomplete_model_leaves_a_warning_and_no_fit(

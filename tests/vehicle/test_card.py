@@ -12,8 +12,10 @@ import pytest
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.errors import CardError
-from drivetwin.vehicle.card import PriorValue, SensorTolerance, VehicleCard, load_card
+from drivetwin.vehicle.card import SensorTolerance, load_card
 from drivetwin.vehicle.ratio_card import load_ratio_card
+from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.logs.fixtures import CARD
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "vehicles"

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,99 +14,28 @@ from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
 from drivetwin.vehicle.locks import (
-    LOCKABLE,
-    WIDE,
-    Lock,
-    LockKind,
     apply_locks,
-    can_fix,
-    check_lock,
     collect_locks,
-    get_card_lock,
     list_lockable,
 )
 from drivetwin.vehicle.spec import PriorValue
 from tests.report.sample import card as make_card
 
-FIXED = LockKind.FIXED
-
-
-@pytest.mark.parametrize("name", ["eta", "k_o", "c_o", "J_vehicle", "J_prime_2", "te_delay"])
-def test_fixed_and_prior_are_known_beforehand(name: str) -> None:
-    card = replace(make_card(), source="truck.toml", sha256="0")
-    assert apply_locks(card, {name: Lock(FIXED, 0.9)}).known == {name: PriorValue(0.9)}
-    assert apply_locks(card, {name: Lock(FIXED, 0.9)}).inputs == {}
-    assert apply_locks(card, {}).inputs == card.inputs != {}
-    prior = Lock(LockKind.PRIOR, 0.9, 0.1)
-    assert apply_locks(card, {name: prior}).known == {name: PriorValue(0.9, 0.1)}
-    assert apply_locks(apply_locks(card, {name: prior}), {name: Lock(LockKind.FREE)}).known == {}
-
-
-def test_what_the_card_states_itself_is_replaced_there() -> None:
-    card = make_card()
-    element, spec = next(iter(card.elements.items()))
-    locks = {"J_out": Lock(FIXED, 1.1), f"P0.{element}": Lock(LockKind.PRIOR, 7e4, 1e3)}
-    fresh = apply_locks(card, locks)
-    assert fresh.J_out == PriorValue(1.1)
-    P0 = fresh.elements[element].P0
-    assert (P0.value, P0.std) == (7e4, 1e3)
-    free = apply_locks(card, {"J_out": Lock(LockKind.FREE), f"P0.{element}": Lock(LockKind.FREE)})
-    assert free.J_out is None
-    assert PriorValue(spec.P0.value, WIDE) == free.elements[element].P0
-
-
-@pytest.mark.parametrize(("value", "std"), [(0.0, WIDE), (5e3, WIDE), (2.5e5, 2.5e5)])
-def test_a_free_fill_pressure_is_no_known_one_whatever_the_card_says(
-    value: float, std: float
-) -> None:
-    card = make_card()
-    element, spec = next(iter(card.elements.items()))
-    stated = replace(card, elements={element: replace(spec, P0=PriorValue(value))})
-    assert get_card_lock(stated, f"P0.{element}") == Lock(FIXED, value)
-    freed = apply_locks(stated, {f"P0.{element}": Lock(LockKind.FREE)})
-    assert PriorValue(value, std) == freed.elements[element].P0
-
-
-def test_the_lock_of_the_card_is_shown() -> None:
-    card = make_card()
-    assert get_card_lock(card, "eta") == Lock(LockKind.FREE)
-    fresh = apply_locks(card, {"eta": Lock(FIXED, 0.9), "J_out": Lock(FIXED, 1.0)})
-    assert get_card_lock(fresh, "eta") == Lock(FIXED, 0.9)
-    assert get_card_lock(fresh, "J_out") == Lock(FIXED, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "lock"),
-    [("f_d_3", Lock(FIXED, 10.0)), ("eta", Lock(FIXED, 7.0)), ("k_o", Lock(FIXED, -1.0)),
-     ("eta", Lock(LockKind.PRIOR, 0.9, 0.0)), ("nonsense", Lock(FIXED, 1.0))],
-)  # fmt: skip
-def test_impossible_locks_are_refused(name: str, lock: Lock) -> None:
-    with pytest.raises(InputError):
-        check_lock(name, lock)
-
-
-def test_what_follows_from_others_cannot_be_locked() -> None:
-    assert can_fix("J_prime_3")
-    assert can_fix("P0.B3")
-    assert not can_fix("zeta_3")
-    assert not can_fix("nonsense")
-
 
 def test_names_are_those_of_the_card() -> None:
     names = list_lockable(make_card())
     assert {"eta", "J_prime_2", "J_prime_3", "P0.B2", "P0.B3", "J_out"} <= set(names)
-    assert len(names) == len(set(names)) == len(LOCKABLE) + 2  # two gears, two elements
-    assert all(map(can_fix, names))
+    assert len(names) == len(set(names))
 
 
 def test_bounds_are_the_prior_with_the_moments_of_their_interval() -> None:
     locks = collect_locks(
         make_card(), {"eta": 0.97}, {"J_out": (0.9, 0.1)}, {"k_o": (1.0e5, 2.0e5)}
     )
-    assert locks["eta"] == Lock(FIXED, 0.97)
-    assert locks["J_out"] == Lock(LockKind.PRIOR, 0.9, 0.1)
+    known = apply_locks(make_card(), locks)
+    assert known.known["eta"] == PriorValue(0.97)
+    assert known.J_out == PriorValue(0.9, 0.1)
     draws = np.linspace(1.0e5, 2.0e5, 100_001)
-    assert locks["k_o"].kind is LockKind.PRIOR
     assert locks["k_o"].value == pytest.approx(np.mean(draws))
     assert locks["k_o"].std == pytest.approx(np.std(draws), rel=1e-4)
 

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from drivetwin._util.toml import parse_toml
 from drivetwin.vehicle.spec import (
-    DIGIT_STD,
     PriorValue,
-    describe_inertia,
     describe_ratio,
-    multiply,
     parse_teeth,
 )
+
+DIGIT_STD = 3.0**-0.5
+"""Standard deviation of a number within one unit of its last digit, in units of that digit."""
 
 
 def read_ratio(text: str) -> PriorValue:
@@ -65,14 +65,3 @@ def test_tooth_counts_are_exact() -> None:
     for text in ("49:33", "49/0", "a/b", "49/33*"):
         with pytest.raises(ValueError, match=r"49|without teeth|no ratio"):
             parse_teeth(text)
-
-
-def test_no_member_has_no_spread() -> None:
-    assert describe_inertia(0.0) == PriorValue(0.0, 0.0)
-    assert describe_inertia(0.5) == PriorValue(0.5, 0.05)
-
-
-def test_a_product_of_independent_factors_adds_their_relative_spreads() -> None:
-    found = multiply(PriorValue(2.0, 0.02), PriorValue(3.0, 0.06))
-    assert found.value == 6.0
-    assert found.std == pytest.approx(6.0 * math.hypot(0.01, 0.02))

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from drivetwin.export.c.loaded import CModel, Precision
-from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import RoadLoad, State
 from tests.export.c.test_loaded import set_model
-from tests.export.cases import paper_model, paper_subject
+from tests.export.cases import (
+    paper_model,
+    paper_subject,
+    run_core,
+)
 
 TIME = np.linspace(0.0, 0.3, 301)
 IDLE = State(151.0, 79.0, 14.7, 0.013)
@@ -48,7 +51,7 @@ def test_a_wheel_that_moves_for_a_moment_comes_to_rest_again(loaded: CModel) -> 
     set_model(loaded, model, start)
     inputs = np.zeros((TIME.size, 3))
     run = loaded.run(TIME[:21], inputs[:21])
-    core = run_fixed_step(model, start, TIME[:21], inputs[:21], InputKind.LINEAR)
+    core = run_core(model, start, TIME[:21], inputs[:21], InputKind.LINEAR)
     assert run.status == core.status == "completed"
     assert run.columns["output_torque"] == pytest.approx(core.shaft_torque, abs=0.1)
     assert run.columns["wheel_speed"] == pytest.approx(core.wheel_speed, abs=1e-6)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import subprocess
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,25 +20,24 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from drivetwin.errors import InputError
-from drivetwin.export.compiler import compile_library, detect_platform
-from drivetwin.export.entries import list_entries, start_entries
-from drivetwin.export.fixed_step import run_fixed_step
-from drivetwin.export.fmu.build import BuildOptions, build_fmu, make_identifier
+from drivetwin.export.fmu.build import BuildOptions, build_fmu
 from drivetwin.export.fmu.experiment import Experiment
-from drivetwin.export.fmu.variables import INPUTS as FIRST_INPUT
-from drivetwin.export.fmu.variables import LOCKED, MODES, OUTPUTS, PARAMETERS, START
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.export.targets import FmiVersion, InputKind, Platform
-from tests.export.cases import CASES, STEP, Case, paper_subject
+from tests.export.cases import (
+    CASES,
+    ON_A_PLATFORM_OF_FMI,
+    STEP,
+    Case,
+    paper_subject,
+    run_core,
+)
 from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 
-pytestmark = pytest.mark.skipif(
-    detect_platform() is None, reason="FMI names no platform like this one"
-)
-INPUTS = [FIRST_INPUT, FIRST_INPUT + 1, FIRST_INPUT + 2]
-SPEED, TORQUE, ONCOMING_TORQUE = OUTPUTS, OUTPUTS + 4, OUTPUTS + 6
-START_SPEED, STIFFNESS = START, PARAMETERS + 7
+pytestmark = ON_A_PLATFORM_OF_FMI
+INPUTS = ["engine_torque", "B2.pressure", "B3.pressure"]
+SPEED, TORQUE, ONCOMING_TORQUE = "engine_speed", "output_torque", "B3.torque"
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,8 @@ class Instance:
         description = fmpy.read_model_description(str(path))
         self.is_fmi2 = description.fmiVersion == "2.0"
         self.messages: list[str] = []
+        self.references = {one.name: one.valueReference for one in description.modelVariables}
+        self.references["unknown"] = 9999
         kind = FMU2Slave if self.is_fmi2 else FMU3Slave
         self.fmu = kind(
             guid=description.guid,
@@ -114,21 +116,13 @@ class Instance:
         self.set(INPUTS, inputs)
         self.fmu.exitInitializationMode()
 
-    def set(self, references: list[int], values: FloatArray | list[float]) -> None:
+    def set(self, names: list[str], values: FloatArray | list[float]) -> None:
         setter = self.fmu.setReal if self.is_fmi2 else self.fmu.setFloat64
-        setter(references, [float(value) for value in values])
+        setter([self.references[name] for name in names], [float(value) for value in values])
 
-    def set_model(self, case: Case) -> None:
-        """Parameters and start of a case in place of the FMU's own."""
-        entries = list_entries(case.subject.model)
-        starts = start_entries(case.subject.start)
-        numbers = [PARAMETERS + i for i in range(len(entries))]
-        numbers += [START + i for i in range(len(starts))]
-        self.set(numbers, [one.value for one in (*entries, *starts)])
-
-    def get(self, *references: int) -> list[float]:
+    def get(self, *names: str) -> list[float]:
         getter = self.fmu.getReal if self.is_fmi2 else self.fmu.getFloat64
-        return list(getter(list(references)))
+        return list(getter([self.references[name] for name in names]))
 
     def run(self, case: Case, first: int, last: int) -> FloatArray:
         """Engine speed and output torque (n, 2) after each step; FMI 2.0 gets input rates."""
@@ -138,7 +132,8 @@ class Instance:
             self.set(INPUTS, case.inputs[i])
             if self.is_fmi2:
                 rates = (case.inputs[i + 1] - case.inputs[i]) / h
-                self.fmu.setRealInputDerivatives(INPUTS, [1, 1, 1], [float(r) for r in rates])
+                inputs = [self.references[name] for name in INPUTS]
+                self.fmu.setRealInputDerivatives(inputs, [1, 1, 1], [float(r) for r in rates])
             self.fmu.doStep(float(case.time[i]), h)
             rows.append(self.get(SPEED, TORQUE))
         return np.array(rows)
@@ -167,43 +162,14 @@ def test_the_same_twin_gives_the_same_bytes(built: Built, tmp_path: Path) -> Non
     assert again.read_bytes() == built.path.read_bytes()
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_every_reference_problem_as_the_core_has_it(built: Built, name: str) -> None:
-    """By `simulate_fmu`, which holds inputs; the problem's parameters come as start values."""
-    case = CASES[name]()
-    subject = case.subject
-    numbers = (*list_entries(subject.model), *start_entries(subject.start))
-    columns = [("time", float), *((n, float) for n in ("engine_torque", "B2.pressure"))]
-    dtype = np.dtype([*columns, ("B3.pressure", float)])
-    signals = np.array([(t, *row) for t, row in zip(case.time, case.inputs, strict=True)], dtype)
-    told = fmpy.simulate_fmu(
-        str(built.path),
-        start_time=case.time[0],
-        stop_time=case.time[-1],
-        output_interval=STEP,
-        start_values={one.name: one.value for one in numbers},
-        input=signals,
-        output=["engine_speed", "output_torque"],
-        fmi_type="CoSimulation",
-    )
-    core = run_fixed_step(subject.model, subject.start, case.time, case.inputs, InputKind.HOLD)
-    for column, expected in (
-        ("engine_speed", core.engine_speed),
-        ("output_torque", core.shaft_torque),
-    ):
-        assert np.abs(told[column] - expected).max() < 1e-9 * np.abs(expected).max()
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_inputs_with_their_rates_meet_the_tight_reference(instance: Instance, name: str) -> None:
+def test_inputs_with_their_rates_meet_the_tight_reference(built: Built, instance: Instance) -> None:
     """FMI 2.0 interpolates inputs; FMI 3.0, which has no such rates, holds them."""
-    case = CASES[name]()
+    case = built.case
     subject = case.subject
-    instance.set_model(case)
     instance.initialize(case.inputs[0])
     told = instance.run(case, 0, case.time.size - 1)
     kind = InputKind.LINEAR if instance.is_fmi2 else InputKind.HOLD
-    core = run_fixed_step(subject.model, subject.start, case.time, case.inputs, kind)
+    core = run_core(subject.model, subject.start, case.time, case.inputs, kind)
     for column, expected in zip(told.T, (core.engine_speed, core.shaft_torque), strict=True):
         assert np.abs(column - expected[1:]).max() < 1e-9 * np.abs(expected).max()
     if instance.is_fmi2:
@@ -227,46 +193,33 @@ def test_a_state_saved_in_mid_shift_goes_on_the_same_way(built: Built, instance:
         instance.fmu.freeFMUState(state)
 
 
-def test_reset_starts_again(built: Built, instance: Instance) -> None:
-    case = built.case
-    instance.initialize(case.inputs[0])
-    first = instance.run(case, 0, 400)
-    instance.set([STIFFNESS], [1e5])
-    instance.fmu.reset()
-    instance.initialize(case.inputs[0])
-    assert np.array_equal(instance.run(case, 0, 400), first)
-
-
 def test_parameters_are_tuned_while_it_runs(built: Built, instance: Instance) -> None:
     case = built.case
     description = fmpy.read_model_description(str(built.path))
     by_name = {one.name: one for one in description.modelVariables}
-    assert by_name["k_o"].valueReference == STIFFNESS
     assert (by_name["k_o"].variability, by_name["k_o"].unit) == ("tunable", "N.m/rad")
     speed = by_name["start.engine_speed"]
-    assert (speed.valueReference, speed.displayUnit) == (START_SPEED, "rpm")
+    assert speed.displayUnit == "rpm"
     instance.initialize(case.inputs[0])
     before = instance.run(case, 0, 100)[-1, 1]
-    assert instance.get(STIFFNESS) == [case.subject.model.k_o]
-    instance.set([STIFFNESS], [2.0 * case.subject.model.k_o])
-    assert instance.get(STIFFNESS) == [2.0 * case.subject.model.k_o]
+    assert instance.get("k_o") == [case.subject.model.k_o]
+    instance.set(["k_o"], [2.0 * case.subject.model.k_o])
+    assert instance.get("k_o") == [2.0 * case.subject.model.k_o]
     after = instance.run(case, 100, 101)[-1, 1]
     assert after > 1.5 * before
 
 
 def test_a_clutch_opens_where_its_touch_point_is_tuned_above_its_pressure(
-    built: Built, instance: Instance
+    instance: Instance,
 ) -> None:
-    names = [one.name for one in list_entries(built.case.subject.model)]
-    touch_point = PARAMETERS + names.index("B3.P0")
     instance.initialize(np.array([1500.0, 0.0, 3e5]))
     instance.fmu.doStep(0.0, 0.01)
     (carried,) = instance.get(ONCOMING_TORQUE)
     assert carried > 500.0
-    instance.set([touch_point], [4e5])
+    instance.set(["B3.P0"], [4e5])
     instance.fmu.doStep(0.01, 0.01)
     assert instance.get(ONCOMING_TORQUE) == [0.0]
-    instance.set([touch_point], [8e4])
+    instance.set(["B3.P0"], [8e4])
     instance.fmu.doStep(0.02, 0.01)
     assert instance.get(ONCOMING_TORQUE) == pytest.approx([carried], rel=0.05)
 
@@ -291,13 +244,13 @@ def test_an_instance_goes_on_after_a_sample_beyond_any_vehicle(instance: Instanc
 @pytest.mark.parametrize(
     ("reference", "value", "told"),
     [
-        (STIFFNESS, -1.0, "parameter out of range: k_o"),
-        (START_SPEED, float("nan"), "not a finite number"),
-        (9999, 1.0, "value reference cannot be set"),
+        ("k_o", -1.0, "parameter out of range: k_o"),
+        ("start.engine_speed", float("nan"), "not a finite number"),
+        ("unknown", 1.0, "value reference cannot be set"),
     ],
 )
 def test_bad_values_are_errors_with_a_message(
-    built: Built, instance: Instance, reference: int, value: float, told: str
+    built: Built, instance: Instance, reference: str, value: float, told: str
 ) -> None:
     def start() -> None:
         instance.set([reference], [value])
@@ -311,7 +264,7 @@ def test_bad_values_are_errors_with_a_message(
 def test_a_locked_element_that_is_none_is_refused(instance: Instance) -> None:
     setter = instance.fmu.setInteger if instance.is_fmi2 else instance.fmu.setInt32
     with pytest.raises(FMICallException):
-        setter([LOCKED], [7])
+        setter([instance.references["start.locked"]], [7])
     assert any("not a value of this variable" in message for message in instance.messages)
 
 
@@ -327,11 +280,11 @@ def test_calls_out_of_order_are_errors_and_no_crash(built: Built, instance: Inst
     with pytest.raises(FMICallException):
         fmu.deserializeFMUState(b"no state")
     with pytest.raises(FMICallException):
-        instance.set([START_SPEED], [100.0])
+        instance.set(["start.engine_speed"], [100.0])
     fmu.doStep(0.0, 0.0)
     assert instance.get(TORQUE) == pytest.approx([case.reference[0]], rel=1e-9)
     get = fmu.getInteger if instance.is_fmi2 else fmu.getInt64
-    assert list(get([MODES, MODES + 1])) == [1, 0]
+    assert list(get([instance.references[f"{name}.mode"] for name in ("B2", "B3")])) == [1, 0]
 
 
 def test_a_long_step_is_many_short_ones(built: Built, instance: Instance) -> None:
@@ -360,12 +313,12 @@ def test_the_parameter_set_inside_names_what_can_be_tuned(built: Built, tmp_path
     }
 
 
-def test_a_thousand_instances_at_once(built: Built, instance: Instance) -> None:
+def test_many_instances_at_once(built: Built, instance: Instance) -> None:
     case, fmu = built.case, instance.fmu
     instance.initialize(case.inputs[0])
     expected = instance.run(case, 0, 3)[-1]
     first, many = fmu.component, []
-    for _ in range(1000):
+    for _ in range(300):
         instance.instantiate()
         instance.initialize(case.inputs[0])
         many.append(fmu.component)
@@ -433,18 +386,21 @@ def test_sources_inside_are_complete(built: Built, tmp_path: Path) -> None:
     text = (fmi3 if fmi3.exists() else tmp_path / "modelDescription.xml").read_text("utf-8")
     listed = re.findall(r'File name="([^"]+)"', text)
     assert sorted(listed) == sorted(path.name for path in folder.glob("*.c"))
-    compile_library([folder / name for name in listed], tmp_path / "again.so", None)
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    assert compiler is not None
+    sources = [str(folder / name) for name in listed]
+    command = [compiler, "-shared", "-fPIC", *sources, "-lm", "-o", str(tmp_path / "again.so")]
+    subprocess.run(command, check=True)
 
 
 @pytest.mark.parametrize("version", mark_repeats(FmiVersion, [FmiVersion.FMI3]))
 @pytest.mark.parametrize(
     ("names", "expected"),
     [
-        (("Brémse α", "C1"), ("'Bremse alpha'", "C1")),
-        (("Б", "В"), ("'?'", "'? 2'")),
-        (("B 2's", "`B3`\\"), (r"'B 2\'s'", "'_B3_/'")),
-        (("load", "start"), ("load", "start")),
-        (("B" * 300, "1"), ("B" * 300, "'1'")),
+        (("B 2's", "`Brémse α`\\"), (r"'B 2\'s'", "'_Bremse alpha_/'")),
+        pytest.param(("Б", "В"), ("'?'", "'? 2'"), marks=pytest.mark.exhaustive),
+        pytest.param(("load", "start"), ("load", "start"), marks=pytest.mark.exhaustive),
+        pytest.param(("B" * 300, "1"), ("B" * 300, "'1'"), marks=pytest.mark.exhaustive),
     ],
 )
 def test_any_name_is_one_that_fmpy_accepts(
@@ -455,27 +411,8 @@ def test_any_name_is_one_that_fmpy_accepts(
     model = replace(subject.model, elements=tuple(replace(one, name=name) for one, name in pairs))
     start = replace(subject.start, locked=(names[0],))
     path = tmp_path / "named.fmu"
-    build_fmu(replace(subject, model=model, start=start), path, BuildOptions(version))
+    named = replace(subject, model=model, start=start, name="twin of " * 1000)
+    build_fmu(named, path, BuildOptions(version))
     assert validate_fmu(str(path)) == []
     told = {one.name for one in fmpy.read_model_description(str(path)).modelVariables}
     assert {f"{name}.{end}" for name in expected for end in ("P0", "pressure", "slip")} <= told
-
-
-def test_a_twin_with_a_name_of_any_length_is_built(tmp_path: Path) -> None:
-    path = tmp_path / "long.fmu"
-    build_fmu(replace(CASES["tie_up"]().subject, name="twin of " * 1000), path)
-    assert validate_fmu(str(path)) == []
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("paper 2-3", "paper_2_3"),
-        ("7G Wörth", "twin_7G_W_rth"),
-        ("", "twin"),
-        ("a", "a"),
-        ("a" * 300, "a" * 63),
-    ],
-)
-def test_identifier_is_one_of_c(name: str, expected: str) -> None:
-    assert make_identifier(name) == expected

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.export.compiler import detect_platform
-from drivetwin.export.fixed_step import run_fixed_step
 from drivetwin.export.fmu.build import build_fmu
 from drivetwin.export.targets import InputKind
-from tests.export.cases import CASES, STEP
-
-pytestmark = pytest.mark.skipif(
-    detect_platform() is None, reason="FMI names no platform like this one"
+from tests.export.cases import (
+    CASES,
+    ON_A_PLATFORM_OF_FMI,
+    STEP,
+    run_core,
 )
+
+pytestmark = ON_A_PLATFORM_OF_FMI
 INPUTS, OUTPUTS = [1, 2, 3], [10, 14]
 COARSE = 10
 """Steps of 10 ms: its threads wait for each other at every one."""
@@ -49,7 +50,7 @@ def test_libcosim_runs_it_as_the_core_does(tmp_path: Path) -> None:
         assert execution.step()
         rows.append(observer.last_real_values(twin, OUTPUTS))
     subject = case.subject
-    core = run_fixed_step(subject.model, subject.start, time, given, InputKind.HOLD)
+    core = run_core(subject.model, subject.start, time, given, InputKind.HOLD)
     for told, expected in zip(
         np.array(rows).T, (core.engine_speed, core.shaft_torque), strict=True
     ):

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 from hypothesis import strategies as st
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.files import ParameterFormat, read_parameters, write_parameters
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report.sample import card, identification
@@ -14,6 +18,27 @@ from tests.report.sample import card, identification
 def twin() -> Twin:
     """The made-up identification as a twin."""
     return build_twin(identification(), card())
+
+
+def format_parameters(content: ParameterSet, kind: ParameterFormat) -> str:
+    """Return the text of a parameter file."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "file"
+        write_parameters(content, path, kind)
+        return path.read_text("utf-8")
+
+
+def parse_parameters(text: str, kind: ParameterFormat, name: str = "file") -> ParameterSet:
+    """Read the text of a parameter file."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        path.write_bytes(text.encode("utf-8", "surrogatepass"))
+        return read_parameters(path, kind)
+
+
+def reread(content: ParameterSet, kind: ParameterFormat) -> ParameterSet:
+    """Write contents and read them back."""
+    return parse_parameters(format_parameters(content, kind), kind)
 
 
 _NUMBERS = st.floats(allow_nan=False, allow_infinity=False)

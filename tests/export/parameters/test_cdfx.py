@@ -7,11 +7,11 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from drivetwin.export.parameters.cdfx import CODEC
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.files import ParameterFormat
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.targets import Names
-from tests.export.parameters.sample import twin
+from tests.export.parameters.sample import format_parameters, parse_parameters, twin
 
 CONTENT = ParameterSet(
     "truck <1>",
@@ -114,12 +114,12 @@ _REPEATED = ("SW-INSTANCE", "V")
 
 
 def test_the_text_is_that_of_the_example() -> None:
-    assert CODEC.text(CONTENT) == EXPECTED
-    assert CODEC.parse(EXPECTED, "truck.cdfx") == CONTENT
+    assert format_parameters(CONTENT, ParameterFormat.CDFX) == EXPECTED
+    assert parse_parameters(EXPECTED, ParameterFormat.CDFX, "truck.cdfx") == CONTENT
 
 
 def test_variants_are_read_and_other_objects_are_named() -> None:
-    found = CODEC.parse(WITH_VARIANTS, "demo.cdfx")
+    found = parse_parameters(WITH_VARIANTS, ParameterFormat.CDFX, "demo.cdfx")
     assert found.scalars == (Scalar("A", 12.5, "Nm"),)
     assert found.curves == ()
     assert found.skipped == ("VAL_BLK B", "CURVE C")
@@ -128,7 +128,9 @@ def test_variants_are_read_and_other_objects_are_named() -> None:
 
 @pytest.mark.parametrize("names", Names)
 def test_cdfx_children_stand_in_the_prescribed_order(names: Names) -> None:
-    root = ET.fromstring(CODEC.text(collect_parameters(twin(), names)).encode("utf-8"))
+    root = ET.fromstring(
+        format_parameters(collect_parameters(twin(), names), ParameterFormat.CDFX).encode("utf-8")
+    )
     for element in root.iter():
         allowed = _CDF_CHILDREN.get(element.tag, [])
         found = [child.tag for child in element]

@@ -7,22 +7,27 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError, InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet
 from drivetwin.export.parameters.files import (
-    CODECS,
     ParameterFormat,
     read_parameters,
     write_parameters,
 )
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.targets import Names
-from tests.export.parameters.sample import SETS, twin
+from tests.export.parameters.sample import (
+    SETS,
+    format_parameters,
+    parse_parameters,
+    reread,
+    twin,
+)
 
-TEXTS = {kind: codec.text(collect_parameters(twin())) for kind, codec in CODECS.items()}
+TEXTS = {kind: format_parameters(collect_parameters(twin()), kind) for kind in ParameterFormat}
 EVERY_FORMAT = pytest.mark.parametrize("kind", ParameterFormat)
 
 
@@ -39,15 +44,17 @@ LIKE_AN_AXIS = ParameterSet(
 @EVERY_FORMAT
 @example(LIKE_AN_AXIS)
 @given(SETS)
-@settings(max_examples=25)
 def test_round_trip(kind: ParameterFormat, content: ParameterSet) -> None:
-    codec = CODECS[kind]
+    """Names and texts are respelled once at most; numbers and units stay to the last bit."""
     try:
-        held = codec.legal(content)
+        held = reread(content, kind)
     except InputError:
         assume(False)
-    assert codec.parse(codec.text(content), "file") == held
-    assert codec.legal(held) == held
+    assert reread(held, kind) == held
+    assert [one.value for one in held.scalars] == [one.value for one in content.scalars]
+    assert [one.values for one in held.curves] == [one.values for one in content.curves]
+    assert [one.axis.points for one in held.curves] == [one.axis.points for one in content.curves]
+    assert [one.unit for one in held.entries] == [one.unit for one in content.entries]
 
 
 @EVERY_FORMAT
@@ -59,7 +66,6 @@ def test_parameters_of_a_twin_survive_the_file(
     path = tmp_path / f"twin.{kind}"
     write_parameters(content, path, kind)
     back = read_parameters(path)
-    assert back == CODECS[kind].legal(content)
     assert back.skipped == ()
     assert [one.value for one in back.scalars] == [one.value for one in content.scalars]
     assert [one.values for one in back.curves] == [one.values for one in content.curves]
@@ -72,7 +78,7 @@ def test_names_that_become_one_are_refused(kind: ParameterFormat) -> None:
     content = collect_parameters(twin())
     doubled = ParameterSet("twice", content.scalars[:1] * 2)
     with pytest.raises(InputError, match="both written as"):
-        CODECS[kind].text(doubled)
+        format_parameters(doubled, kind)
 
 
 @pytest.mark.parametrize(
@@ -85,40 +91,39 @@ def test_the_name_of_an_axis_is_nobody_elses(kind: ParameterFormat, other: str) 
         for name, axis in (("mu.B3", "slip"), (other, "v"))
     )
     with pytest.raises(InputError, match=r"the axis of 'mu\.B3' are both written as"):
-        CODECS[kind].text(ParameterSet("t", (), curves))
+        format_parameters(ParameterSet("t", (), curves), kind)
 
 
 @EVERY_FORMAT
 @pytest.mark.parametrize("text", ["", "\n", "<a/>", "{}", "a,b\n1,2\n", "x = ;", "\u00e4 = \u00b5"])
 def test_what_is_no_parameter_file_is_refused(kind: ParameterFormat, text: str) -> None:
     with pytest.raises(FileFormatError):
-        CODECS[kind].parse(text, "file")
+        parse_parameters(text, kind)
 
 
 @EVERY_FORMAT
 @pytest.mark.parametrize("wrong", ["nan", "inf", "0,85"])
 def test_a_value_that_is_no_finite_number_is_refused(kind: ParameterFormat, wrong: str) -> None:
-    text = CODECS[kind].text(collect_parameters(twin()))
+    text = TEXTS[kind]
     assert text.count("176000.0") == 1
     with pytest.raises(FileFormatError):
-        CODECS[kind].parse(text.replace("176000.0", wrong), "file")
+        parse_parameters(text.replace("176000.0", wrong), kind)
 
 
 @EVERY_FORMAT
 def test_a_curve_that_lost_a_point_is_refused(kind: ParameterFormat) -> None:
     content = collect_parameters(twin())
-    text = CODECS[kind].text(content)
+    text = TEXTS[kind]
     last = repr(content.curves[0].axis.points[-1])
     repeated = repr(content.curves[0].axis.points[-2])
     assert text.count(last) >= 1
     with pytest.raises(FileFormatError, match=r"do not increase|axis points for"):
-        CODECS[kind].parse(text.replace(last, repeated), "file")
+        parse_parameters(text.replace(last, repeated), kind)
 
 
 @EVERY_FORMAT
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.text(max_size=5))
 @example(0.0, 0.0, '"')
-@settings(max_examples=60)
 def test_a_damaged_file_is_read_or_refused_never_a_crash(
     kind: ParameterFormat, start: float, length: float, inserted: str
 ) -> None:
@@ -126,7 +131,7 @@ def test_a_damaged_file_is_read_or_refused_never_a_crash(
     first = int(start * len(text))
     damaged = text[:first] + inserted + text[first + int(length**6 * len(text)) :]
     with suppress(FileFormatError):
-        CODECS[kind].parse(damaged, "file")
+        parse_parameters(damaged, kind)
 
 
 def test_a_format_is_known_by_its_ending(tmp_path: Path) -> None:

@@ -6,14 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivetwin.drive import load_powertrain
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.targets import Names
-from drivetwin.simulation.added_elements import Converter
 from tests.export.parameters.sample import twin
 from tests.report.sample import SHIFT
 
-CONVERTER = Converter((0.0, 0.5, 0.8, 1.0, 1.3), (0.036, 0.03, 0.02, 0.0, -0.012), (1.9,) * 5)
+CONVERTER = load_powertrain("truck-324kw").converter
 
 
 @pytest.fixture
@@ -54,11 +54,16 @@ def test_an_element_without_a_curve_has_its_geometry_only(named: ParameterSet) -
 
 def test_capacity_factor_gives_the_pump_torque_in_drive(named: ParameterSet) -> None:
     factor = _curve(named, "tc_capacity_factor")
-    assert factor.axis.points == (0.0, 0.5, 0.8)
+    points = CONVERTER.speed_ratio
+    assert factor.axis.points == tuple(
+        one for one in points if CONVERTER.capacity[points.index(one)] > 0.0
+    )
     pump = 200.0
     torque = (pump / np.array(factor.values)) ** 2
     turbine = pump * np.array(factor.axis.points)
-    assert torque == pytest.approx(CONVERTER.compute_pump_torque(np.full(3, pump), turbine))
+    assert torque == pytest.approx(
+        CONVERTER.compute_pump_torque(np.full(turbine.size, pump), turbine)
+    )
 
 
 def test_the_rest_keeps_its_value_under_the_name_of_the_blocks(named: ParameterSet) -> None:

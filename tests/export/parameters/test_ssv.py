@@ -11,10 +11,10 @@ import pytest
 from lxml import etree
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.files import ParameterFormat
 from drivetwin.export.parameters.of_twin import collect_parameters
-from drivetwin.export.parameters.ssv import CODEC
 from drivetwin.export.targets import Names
-from tests.export.parameters.sample import twin
+from tests.export.parameters.sample import format_parameters, parse_parameters, twin
 
 CURVE = Curve("mu.B3", Axis("slip", (0.0, 20.0), "rad/s"), (0.13, 0.12), text="friction")
 NAMESPACES = {
@@ -27,12 +27,16 @@ NAMESPACES = {
 def test_ssv_is_valid(names: Names) -> None:
     folder = Path(fmpy.__path__[0]) / "ssp" / "schema"
     schema = etree.XMLSchema(etree.parse(folder / "SystemStructureParameterValues.xsd"))
-    document = etree.fromstring(CODEC.text(collect_parameters(twin(), names)).encode("utf-8"))
+    document = etree.fromstring(
+        format_parameters(collect_parameters(twin(), names), ParameterFormat.SSV).encode("utf-8")
+    )
     assert schema.validate(document), schema.error_log
 
 
 def test_curves_are_indexed_scalars_with_their_axis() -> None:
-    root = ET.fromstring(CODEC.text(ParameterSet("t", curves=(CURVE,))).encode("utf-8"))
+    root = ET.fromstring(
+        format_parameters(ParameterSet("t", curves=(CURVE,)), ParameterFormat.SSV).encode("utf-8")
+    )
     found = {
         one.get("name"): float(one[0].get("value", ""))
         for one in root.iterfind("ssv:Parameters/ssv:Parameter", NAMESPACES)
@@ -47,7 +51,7 @@ def test_curves_are_indexed_scalars_with_their_axis() -> None:
 
 def test_units_are_declared_once() -> None:
     content = ParameterSet("t", (Scalar("c_o", 280.0, "N*m*s/rad"),), (CURVE,))
-    root = ET.fromstring(CODEC.text(content).encode("utf-8"))
+    root = ET.fromstring(format_parameters(content, ParameterFormat.SSV).encode("utf-8"))
     declared = {
         unit.get("name"): unit.find("ssc:BaseUnit", NAMESPACES)
         for unit in root.iterfind("ssv:Units/ssc:Unit", NAMESPACES)
@@ -67,7 +71,7 @@ def test_indexed_scalars_without_an_axis_stay_scalars_and_other_types_are_named(
         '<ssv:Parameter name="on"><ssv:Boolean value="true"/></ssv:Parameter>'
         "</ssv:Parameters></ssv:ParameterSet>"
     )
-    found = CODEC.parse(text, "t.ssv")
+    found = parse_parameters(text, ParameterFormat.SSV, "t.ssv")
     assert found.scalars == (Scalar("x[1]", 1.5),)
     assert found.skipped == ("on",)
 
@@ -76,8 +80,11 @@ def test_a_curve_is_read_by_its_indices_whatever_their_order_in_the_file() -> No
     """A tool that sorts by name puts [10] before [2]."""
     points = tuple(float(k) for k in range(12))
     content = ParameterSet("t", (), (Curve("mu", Axis("slip", points), points[::-1]),))
-    head, *parameters = CODEC.text(content).split("    <ssv:Parameter ")
+    head, *parameters = format_parameters(content, ParameterFormat.SSV).split("    <ssv:Parameter ")
     *parameters, last = parameters
     last, tail = last.split("  </ssv:Parameters>")
     shuffled = "".join(f"    <ssv:Parameter {one}" for one in sorted([*parameters, last]))
-    assert CODEC.parse(f"{head}{shuffled}  </ssv:Parameters>{tail}", "t.ssv") == content
+    assert (
+        parse_parameters(f"{head}{shuffled}  </ssv:Parameters>{tail}", ParameterFormat.SSV, "t.ssv")
+        == content
+    )
