@@ -26,8 +26,6 @@ class Code(StrEnum):
     """Kind of a finding, the key of its entry in the catalogue."""
 
     RECORDING = auto()
-    LOCKUP_MISFIT = auto()
-    LOCKUP_DISAGREES = auto()
     COLUMN_AMBIGUOUS = auto()
     NO_PRESSURE = auto()
     PRESSURE_STEPS = auto()

@@ -17,7 +17,7 @@ def test_suggestions_and_profile(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["examine", str(bench_files.log), "--vehicle", str(bench_files.card)]
-    more = ["--profile", "eta", "--friction", "falling", "--dependences"]
+    more = ["--profile", "eta", "--friction", "falling"]
     assert main([*arguments, *more, "-o", str(tmp_path / "asked")]) == 0
     printed = capsys.readouterr().out
     assert "Next recordings: each experiment was simulated" in printed
@@ -34,8 +34,6 @@ def test_suggestions_and_profile(
     friction = json.loads((tmp_path / "asked" / "friction.json").read_text())
     curve = friction["friction"]["B3"]
     assert load_twin(tmp_path / "asked" / "twin.toml").friction["B3"].mu.tolist() == curve["mu"]
-    dependences = json.loads((tmp_path / "asked" / "dependences.json").read_text())
-    assert {one["kind"] for one in dependences["dependences"]} == {"drag", "pressure"}
 
 
 def test_an_unknown_parameter_writes_nothing(

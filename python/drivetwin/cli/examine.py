@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drivetwin._util.request import Request, flag, input_file, option, output_folder
+from drivetwin._util.request import Request, input_file, option, output_folder
 from drivetwin.cli.arguments import card_option, log_argument, mapping_option
 from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
 from drivetwin.errors import InputError
@@ -20,15 +19,11 @@ from drivetwin.report.blocks import Block, TableBlock, make_table
 
 if TYPE_CHECKING:
     from drivetwin.cli.identify_run import Outcome
-    from drivetwin.estimation.analysis.bootstrap import Bootstrap
-    from drivetwin.estimation.analysis.friction_dependence import Dependence
     from drivetwin.estimation.analysis.profile_likelihood import Profile
-    from drivetwin.estimation.result.estimate import Estimate
     from drivetwin.fit.examine import Improvement
     from drivetwin.twin.twin import Twin
 
-SUGGESTIONS, BOOTSTRAP = "suggestions.json", "bootstrap.json"
-FRICTION, DEPENDENCES = "friction.json", "dependences.json"
+SUGGESTIONS, FRICTION = "suggestions.json", "friction.json"
 
 
 class Examine(Request, command="examine"):
@@ -43,14 +38,10 @@ class Examine(Request, command="examine"):
         metavar="PARAMETER",
         default=(),
     )
-    bootstrap: int = option(
-        "Fit N logs simulated from the fit with other noise.", metavar="N", minimum=0, default=0
-    )
-    seed: int = option("Seed of the bootstrap's noise.", minimum=0, default=0)
+    seed: int = option("Seed of the starts of a model's fit.", minimum=0, default=0)
     friction: FrictionShape | None = option(
         "Estimate friction over slip as a curve of this shape instead of the Stribeck law."
     )
-    dependences: bool = flag("Estimate drag of the open clutches, and friction over pressure.")
     output: Path | None = output_folder("Folder for the files.")
 
 
@@ -59,9 +50,8 @@ def examine(request: Examine, *, as_json: bool) -> None:
 
     The log is first identified by the likelihood method. The command lists the experiments that
     narrow weak, not identifiable and least known parameters, with the expected intervals. Options
-    add the profile likelihood, a parametric bootstrap, friction curves of free or monotone shape
-    with a twin, and dependences of friction and drag. With a model file the log is fitted as by
-    'drivetwin fit', and all but the last two apply.
+    add the profile likelihood, and friction curves of free or monotone shape with a twin. With a
+    model file the log is fitted as by 'drivetwin fit', and all but the friction curves apply.
     """
     from drivetwin.cli.identify_run import IdentifyOptions, run_identification
 
@@ -97,9 +87,7 @@ class Answer:
 
 def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
     """Every answer, in the order in which they are printed."""
-    from drivetwin.estimation.analysis.bootstrap import bootstrap
     from drivetwin.estimation.analysis.experiment_design import compute_rankings
-    from drivetwin.estimation.analysis.friction_dependence import estimate_dependences
     from drivetwin.estimation.analysis.profile_likelihood import compute_profile
     from drivetwin.files import analysis_files
     from drivetwin.report.sections.identifiability import build_suggestion_blocks
@@ -112,15 +100,9 @@ def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
         analysis_files.format_suggestions(suggestions),
         build_suggestion_blocks(suggestions, found.estimates),
     )
-    yield from _iterate_interval_answers(found, request, compute_profile, bootstrap)
+    yield from _iterate_profiles(found, request, compute_profile)
     if request.friction is not None:
         yield _identify_friction(outcome, request.friction)
-    if request.dependences:
-        with show_step("estimating drag and friction over pressure"):
-            seen = estimate_dependences(found)
-        yield Answer(
-            DEPENDENCES, analysis_files.format_dependences(seen), [_build_dependence_table(seen)]
-        )
 
 
 def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
@@ -172,45 +154,10 @@ def _build_profile_table(one: Profile, unit: str) -> TableBlock:
     return make_table(f"Profile likelihood of {one.parameter}", columns, rows)
 
 
-def _build_bootstrap_table(one: Bootstrap, estimates: Mapping[str, Estimate]) -> TableBlock:
-    """Build the table of the spreads by covariance and by bootstrap."""
-    from drivetwin.estimation.result.estimate import Z95
-    from drivetwin.report.sections.identifiability import format_half_width
-
-    rows = []
-    for name, std, bias in zip(one.ids, one.std, one.bias, strict=True):
-        estimate = estimates[name]
-        if std == 0.0:
-            continue
-        widths = (Z95 * (estimate.std_noise or math.inf), Z95 * float(std))
-        shown = (format_half_width(width, estimate.unit) for width in widths)
-        rows.append((name, *shown, f"{bias / std:+z.2f} σ"))
-    return make_table(
-        f"Bootstrap: {len(one.values)} fits, {one.failed} failed",
-        ("parameter", ("by covariance", "s"), ("by bootstrap", "s"), ("bias", "s")),
-        rows,
-    )
-
-
-def _build_dependence_table(found: tuple[Dependence, ...]) -> TableBlock:
-    from drivetwin.estimation.analysis.friction_dependence import UNITS
-    from drivetwin.estimation.result.estimate import Z95
-
-    rows = [
-        (one.element, one.kind, one.value, Z95 * one.std, UNITS[one.kind], one.text)
-        for one in found
-    ]
-    return make_table(
-        "Dependences that the friction law lacks",
-        ("element", "dependence", ("value", ".2g"), ("± 95 %", ".1g"), "unit", ""),
-        rows,
-    )
-
-
 def _iterate_fit_answers(model: Path, request: Examine) -> Iterator[Answer]:
     """Fit a model to a log, and yield every answer in the order in which they are printed."""
     from drivetwin.files import analysis_files
-    from drivetwin.fit.examine import bootstrap, compute_profile, rank_improvements
+    from drivetwin.fit.examine import compute_profile, rank_improvements
     from drivetwin.fit.fit import fit_network
     from drivetwin.fit.model_file import read_model
     from drivetwin.fit.read import read_recording
@@ -227,16 +174,13 @@ def _iterate_fit_answers(model: Path, request: Examine) -> Iterator[Answer]:
         analysis_files.format_improvements(improvements, units),
         [_build_improvement_table(improvements, units)],
     )
-    yield from _iterate_interval_answers(found, request, compute_profile, bootstrap)
+    yield from _iterate_profiles(found, request, compute_profile)
 
 
-def _iterate_interval_answers(
-    found: Any,
-    request: Examine,
-    compute_profile: Callable[[Any, str], Profile],
-    bootstrap: Callable[[Any, int, int], Bootstrap],
+def _iterate_profiles(
+    found: Any, request: Examine, compute_profile: Callable[[Any, str], Profile]
 ) -> Iterator[Answer]:
-    """Yield profiles and bootstrap of a fit, by the functions for its kind of model."""
+    """Yield the profiles of a fit, by the function for its kind of model."""
     from drivetwin.files import analysis_files
 
     units = {name: one.unit for name, one in found.estimates.items()}
@@ -245,11 +189,6 @@ def _iterate_interval_answers(
             one = compute_profile(found, name)
         text = analysis_files.format_profile(one, units[name])
         yield Answer(f"profile.{name}.json", text, [_build_profile_table(one, units[name])])
-    if request.bootstrap:
-        with show_step(f"bootstrap of {request.bootstrap} fits"):
-            refits = bootstrap(found, request.bootstrap, request.seed)
-        text = analysis_files.format_bootstrap(refits, units)
-        yield Answer(BOOTSTRAP, text, [_build_bootstrap_table(refits, found.estimates)])
 
 
 def _build_improvement_table(found: Sequence[Improvement], units: Mapping[str, str]) -> TableBlock:

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
 from drivetwin._util.plain_values import format_json
-from drivetwin.estimation.analysis.bootstrap import Bootstrap
-from drivetwin.estimation.analysis.friction_dependence import UNITS, Dependence
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.analysis.profile_likelihood import Profile
 from drivetwin.estimation.result.suggestion import ExperimentRanking
@@ -43,24 +41,6 @@ def format_profile(one: Profile, unit: str) -> str:
     )
 
 
-def format_bootstrap(one: Bootstrap, units: Mapping[str, str]) -> str:
-    """`bootstrap.json`: every refit by parameter, and its spread."""
-    low, high = one.interval
-    std, bias = one.std, one.bias
-    parameters = {
-        name: {
-            "unit": units[name],
-            "estimate": one.estimate[k],
-            "std": std[k],
-            "bias": bias[k],
-            "ci95": (low[k], high[k]),
-            "refits": one.values[:, k],
-        }
-        for k, name in enumerate(one.ids)
-    }
-    return format_json({"seed": one.seed, "failed": one.failed, "parameters": parameters})
-
-
 def format_friction(one: ShapedFriction) -> str:
     """`friction.json`: μ over slip of the shape asked for, by element, with its 95 % band."""
     curves = {
@@ -68,12 +48,3 @@ def format_friction(one: ShapedFriction) -> str:
         for name, curve in one.curves.items()
     }
     return format_json({"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves})
-
-
-def format_dependences(found: tuple[Dependence, ...]) -> str:
-    """`dependences.json`: drag of open clutches, and μ that goes with pressure or temperature."""
-    names = ("kind", "element", "value", "std", "plausible", "text")
-    rows = [
-        {name: getattr(one, name) for name in names} | {"unit": UNITS[one.kind]} for one in found
-    ]
-    return format_json({"dependences": rows})

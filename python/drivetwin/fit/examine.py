@@ -1,28 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Certainty of a fit: what would narrow its intervals, profiles, and a parametric bootstrap."""
+"""Certainty of a fit: what would narrow its intervals, and profiles."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import scale_progress
-from drivetwin.errors import IdentificationError, InputError
-from drivetwin.estimation.analysis.bootstrap import MIN_FITS, Bootstrap, draw_prior
+from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.profile_likelihood import Profile, trace_profile
-from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.likelihood.data.input_smoothing import smooth_pressure
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
 from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.result import ModelFit
-from drivetwin.fit.search import BENT, Problem
-from drivetwin.fit.term import NetworkTerm
+from drivetwin.fit.search import Problem
 
 REPEATS = 4
 """Recordings in place of one that an improvement assumes."""
@@ -64,65 +57,6 @@ def rank_improvements(found: ModelFit) -> tuple[Improvement, ...]:
             Improvement(one.name, float(widths[0]), float(widths[1]), known, float(widths[2]))
         )
     return tuple(improvements)
-
-
-def bootstrap(found: ModelFit, count: int, seed: int) -> Bootstrap:
-    """Fit `count` recordings drawn from a fit; equal seeds give equal results.
-
-    Raises InputError for fewer than `MIN_FITS`, IdentificationError where most refits fail.
-    """
-    if count < MIN_FITS:
-        raise InputError(
-            f"a bootstrap of {count} fits is too small for a spread", f"ask for {MIN_FITS} or more"
-        )
-    rows = list(_iterate_refits(found, count, seed))
-    if len(rows) < count / 2:
-        raise IdentificationError(
-            f"{count - len(rows)} of {count} recordings made from the fit could not be fitted",
-            "trust no interval of this fit; record a manoeuvre with more excitation",
-        )
-    values = found.values
-    estimate = np.array(list(values.values()))
-    return Bootstrap(seed, tuple(values), estimate, np.array(rows), count - len(rows))
-
-
-def _iterate_refits(found: ModelFit, count: int, seed: int) -> Iterator[list[float]]:
-    point = found.minimum.point
-    for number, generator in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        with scale_progress(number / count, (number + 1) / count, "bootstrap"):
-            problem = _draw_problem(found, np.random.default_rng(generator))
-            again = minimise(problem.update_weighting(point), point, settings=BENT)
-            if again is not None and again.converged:
-                yield [one.to_value(again.point[one.name]) for one in found.sought]
-
-
-def _draw_problem(found: ModelFit, rng: np.random.Generator) -> Problem:
-    """Draw the problem of recordings with new noise and new priors."""
-    terms = tuple(_draw_term(term, found, rng) for term in found.problem.terms)
-    prior = draw_prior(found.problem.prior, found.minimum.point.values, rng)
-    return replace(found.problem, terms=terms, prior=prior)
-
-
-def _draw_term(term: NetworkTerm, found: ModelFit, rng: np.random.Generator) -> NetworkTerm:
-    """Draw one recording: exact outputs of the expected inputs, then noise on all."""
-    record = term.record
-    run = term.simulate(found.minimum.point)
-    columns = {name: run.columns[output] for name, output in term.plant.outputs.items()}
-    exact: FloatArray = record.sample(columns)
-    ends = np.cumsum([out.values.size for out in record.outputs])[:-1]
-    drawn = np.split(exact + record.sigma * rng.standard_normal(record.size), ends)
-    outputs = tuple(
-        replace(out, values=values) for out, values in zip(record.outputs, drawn, strict=True)
-    )
-    inputs, held_back = {}, {}
-    for name, signal in record.inputs.items():
-        sigma = record.input_sigma[name]
-        read = signal.values + sigma * rng.standard_normal(signal.values.size)
-        driving = smooth_pressure(MeasuredSignal(signal.time, read, sigma))
-        inputs[name] = replace(signal, values=driving)
-        held_back[name] = read - driving
-    made = replace(record, outputs=outputs, inputs=inputs, held_back=held_back, fast=held_back)
-    return NetworkTerm.from_sensor_noise(term.plant, made)
 
 
 def compute_profile(found: ModelFit, unknown: str) -> Profile:
