@@ -53,6 +53,7 @@ class Code(StrEnum):
     CLOCKS_DRIFT = auto()
     TORQUE_CLOCK_LATE = auto()
     TORQUE_LATE_OR_SLIP = auto()
+    OUTPUT_TORQUE_ALIGNED = auto()
     TABLE_ROWS_COARSE = auto()
     SHIFTS_NOT_FITTED = auto()
     LOCKUP_UNKNOWN = auto()

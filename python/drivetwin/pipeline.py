@@ -23,6 +23,7 @@ from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
+from drivetwin.estimation.linear.output_torque_delay import align_output_torque
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
@@ -122,6 +123,8 @@ def identify(
         _refuse_wrong_pressures(log, card, shifts)
         actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
         prepared = _prepare_checked(log, apply_locks(card, locks), shifts)
+        if method is not Method.PAPER:
+            prepared = align_output_torque(prepared)
     with stages.enter("estimation"):
         found = _attach_actuators(identify_prepared(prepared, method), actuators)
     if not locks:
@@ -163,7 +166,7 @@ def identify_jointly(
         for log, found in pairs:
             _refuse_wrong_pressures(log, card, found)
         actuators = identify_actuators([LogShifts(log, one.shifts) for log, one in pairs], card)
-        prepared = [_prepare_checked(log, card, one) for log, one in pairs]
+        prepared = [align_output_torque(_prepare_checked(log, card, one)) for log, one in pairs]
     with _JOINT.enter("estimation"):
         return _attach_actuators(identify_joint(prepared), actuators)
 

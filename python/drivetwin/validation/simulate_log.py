@@ -164,12 +164,26 @@ def attach_validation(found: Identification, twin: Twin, log: ShiftLog) -> Ident
 
 
 def _simulate_shifts(twin: Twin, log: ShiftLog, found: Identification) -> Iterator[Validation]:
-    """Simulate the shifts in order with progress notices; on hills each with its own load."""
+    """Simulate the shifts in order with progress notices; on hills each with its own load.
+
+    Each is compared with the output torque at the stamps of the fit.
+    """
     loads = found.evidence.loads
+    moved = {one.shift.lockup_time: one.output_torque_shift for one in found.evidence.signals}
     for count, shift in enumerate(found.shifts):
         notify_progress(count / len(found.shifts))
         model = twin.build_dual_clutch(shift, load=loads[count]) if loads else None
-        yield simulate_shift(twin, log, shift, model)
+        seen = _move_output_torque(log, moved.get(shift.lockup_time, 0.0))
+        yield simulate_shift(twin, seen, shift, model)
+
+
+def _move_output_torque(log: ShiftLog, shift: float) -> ShiftLog:
+    """Add `shift` [s] to the stamps of the output torque."""
+    if shift == 0.0:
+        return log
+    torque = log["output_torque"]
+    moved = replace(torque, time=torque.time + shift)
+    return replace(log, channels={**log.channels, "output_torque": moved})
 
 
 def clip_phases(shift: Shift, window: tuple[float, float]) -> dict[str, tuple[float, float]]:

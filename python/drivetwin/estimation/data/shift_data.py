@@ -242,6 +242,8 @@ class ShiftSignals:
     """Number of the log, from 1, where several are fitted together; 0: there is one only."""
     torque_of_speeds: TorqueOfSpeeds | None = None
     """Source of a turbine torque computed from speeds; None for a measured engine torque."""
+    output_torque_shift: float = 0.0
+    """Time [s] added to the stamps of the output torque; negative for a sensor that is late."""
 
     @property
     def output_gaps(self) -> tuple[Span, ...]:
