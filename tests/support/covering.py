@@ -46,6 +46,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
 def pytest_sessionfinish() -> None:
     """Write what this worker recorded."""
     _recorder.stop()
+    if not _seconds:  # the process that hands the tests out
+        return
     data = _recorder.get_data()
     lines = {
         module: {
