@@ -97,7 +97,7 @@ test-browser: $(venv)/.dev native ## report and workbench in Chromium; pictures 
 
 .PHONY: mutation
 mutation: $(venv)/.dev native ## do tests reject wrong lines? eight modules, 40 mutants each, some hours
-	$(pip) install --quiet --group mutation
+	$(pip) install --quiet 'cosmic-ray>=8.4' 'coverage>=7.10' # not in constraints.txt: no wheels for all
 	rm -rf out/covering
 	$(pytest) -p tests.support.covering
 	$(bin)/python -m tools.mutation draw out/mutants.jsonl

@@ -233,8 +233,9 @@ def make_memory_error(path: Path, memory: int) -> ReaderFailureError:
 def format_error(error: DrivetwinError) -> dict[str, Any]:
     """Return a typed error as a reply."""
     where = error.where
+    public = next(one for one in type(error).__mro__ if one.__module__ == errors.__name__)
     return {
-        "error": type(error).__name__,
+        "error": public.__name__,
         "what": error.what,
         "remedy": error.remedy,
         "where": [where.file, where.channel, where.time, where.key],

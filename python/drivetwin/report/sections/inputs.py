@@ -7,7 +7,7 @@ import operator
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from drivetwin.channels.units import BAR
+from drivetwin._util.display_units import BAR
 from drivetwin.report.blocks import TableBlock, make_table
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def build_card_tables(card: VehicleCard) -> list[TableBlock]:
         (gear.name, _format_prior(gear.ratio), ", ".join(gear.elements)) for gear in card.gears
     ]
     elements = [
-        (name, spec.kind, _format_prior(spec.P0.scale(1.0 / BAR)), _format_prior(spec.gain))
+        (name, spec.kind, _format_prior(spec.P0.scale(BAR.factor)), _format_prior(spec.gain))
         for name, spec in card.elements.items()
     ]
     low, high = card.J_prime_range
