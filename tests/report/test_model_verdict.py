@@ -83,7 +83,7 @@ def test_without_torque_scale_the_sensor_is_asked_for() -> None:
     open_ids = {**found.estimates, "eta": replace(found.estimates["eta"], reason=reason)}
     verdict = explain_identification(replace(found, estimates=open_ids))
     assert "divided by η" in verdict.reason
-    assert verdict.action == "Add an output-shaft torque sensor."
+    assert verdict.action.startswith("Add an output-shaft torque sensor, or enter J_vehicle_kgm2")
 
 
 def test_a_model_that_is_not_valid_names_error_and_suspect() -> None:

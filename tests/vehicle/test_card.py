@@ -150,7 +150,7 @@ def test_sensors_and_channels_go_by_role_in_si(tmp_path: Path) -> None:
         ("gain_m3 = 0.03", "gain_m3 = 9e18", "elements.B2.gain_m3", "9e+18 is beyond 0 to 1000"),
         ("[2500, 6500]", "[2500, 9e18]", "inertia.J_vehicle_kgm2", "beyond 0 to 1e+08"),
         ("[4, 20]", "[4, 9e18]", "inertia.J_prime_kgm2", "beyond 0 to 1e+08"),
-        ("P0_bar = 0.8", "P0_bar = 9e18", "elements.B2.P0_bar", "9e+18 is beyond 0 to 10000"),
+        ("P0_bar = 0.8", "P0_bar = 9e18", "elements.B2.P0_bar", "9e+18 is beyond 0 to 1e+06"),
         (
             "P0_bar = 0.8",
             "P0_bar = 0.8, drum_inertia_kgm2 = 9e18",

@@ -40,7 +40,7 @@ from drivetwin.vehicle.spec import (
 
 _Table = TypeVar("_Table", bound=StrictModel)
 MOST_PRESSURE = 1e6
-"""Largest fill pressure of a card [bar]: a usual one entered in Pa, which `card check` names, is read."""
+"""Largest fill pressure of a card [bar]; a usual one entered in Pa is left to `card check`."""
 MOST_GAIN = 1e3
 """Largest gain of a card [m^3]: a thousand of the largest clutches of ships."""
 MOST_PEAK = 1e3

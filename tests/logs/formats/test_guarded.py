@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import subprocess
 import sys
@@ -36,6 +37,10 @@ def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Recor
     monkeypatch.setattr(guarded, "BASE_MEMORY", 2**26)
     with open_guarded(open_hostile, tmp_path / "log.bin", ReadOptions()) as opened:
         yield opened
+
+
+ENDED = "crashes on the file|cannot be read"
+"""A process that divides by zero ends on some machines and raises on others."""
 
 
 @pytest.fixture
@@ -118,7 +123,7 @@ def test_a_reader_that_hangs_is_stopped(
 
 def test_a_file_that_crashes_the_library_is_a_typed_error(crashing: Path) -> None:
     for read in (read_raw, lambda path: read_log(path, None)):
-        with pytest.raises(FileFormatError, match="crashes on the file") as caught:
+        with pytest.raises(FileFormatError, match=ENDED) as caught:
             read(crashing)
         assert isinstance(caught.value, ReaderFailureError)
         assert caught.value.where.file == str(crashing)
@@ -129,7 +134,7 @@ def test_the_program_survives_a_file_that_crashes_the_library(crashing: Path) ->
     command = [sys.executable, "-m", "drivetwin", "inspect", str(crashing)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 2
-    assert "crashes on the file" in done.stderr
+    assert re.search(ENDED, done.stderr)
     assert "Traceback" not in done.stderr
 
 

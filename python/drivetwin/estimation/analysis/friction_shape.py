@@ -247,7 +247,7 @@ def _build_curve(
     )
     mu = between @ at_knots
     half = Z95 * np.sqrt(propagate_variance(between, spread))
-    return replace(
+    curve = replace(
         seen,
         slip=slip,
         mu=mu,
@@ -257,6 +257,7 @@ def _build_curve(
         stribeck_covariance=None,
         method=f"likelihood, {shape} shape",
     )
+    return curve if seen.gain is None else curve.add_gain_spread(seen.gain)
 
 
 def project_shape(
