@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ class RandomNetwork:
     inputs: dict[str, tuple[FloatArray, FloatArray]]
     speeds: dict[str, float]
     locked: tuple[str, ...]
+    grid: FloatArray = field(default_factory=lambda: np.linspace(0.0, SECONDS, 101))
+    """Times at which a run is recorded [s]."""
 
     @property
     def inertias(self) -> dict[str, float]:
@@ -348,3 +350,62 @@ class _CancellingDraw(_Draw):
         steps = self.rng.normal(size=self.times.size) * self.rng.uniform(0.0, 30.0)
         name = self.input(f"w {len(self.elements)}", self.speeds[node] + steps - steps[0])
         self.add("prescribed_speed", node=node, input=name)
+
+
+def draw_resting_network(seed: int) -> RandomNetwork:
+    """Draw a network at rest but for round-off, over a grid that ends anywhere.
+
+    In half of the networks a locked brake holds every node. Torques are absent, or small against
+    the brakes. Some shafts are couplings whose gap is zero.
+    """
+    return _RestingDraw(np.random.default_rng(seed)).network()
+
+
+class _RestingDraw(_Draw):
+    """Nodes, clutches and shafts around zero speed; inputs end with the grid."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        super().__init__(rng)
+        points, end = int(rng.integers(2, 200)), float(10.0 ** rng.uniform(-3.0, 1.0))
+        even = np.linspace(0.0, end, points)
+        self.grid = even if rng.random() < 0.5 else np.cumsum(np.full(points, end / points))
+        self.times = np.linspace(0.0, self.grid[-1], self.times.size)
+
+    def network(self) -> RandomNetwork:
+        """Draw a whole network."""
+        rng = self.rng
+        for node in self.nodes:
+            self.add("inertia", node=node, inertia=10.0 ** float(rng.uniform(-4.0, 4.0)))
+        draws = [self.backlash, self.backlash, self.spring, self.clutch, self.one_way, self.load]
+        draws += [self.torque, self.gear]
+        for _ in range(int(rng.integers(1, 8))):
+            draws[int(rng.integers(len(draws)))]()
+        brakes = self.nodes if rng.random() < 0.5 else []
+        locked = [self.brake(node) for node in brakes]
+        slipping = [e["name"] for e in self.elements if e["type"] in ("clutch", "one_way_clutch")]
+        locked += [name for name in slipping if name not in locked and rng.random() < 0.5]
+        return RandomNetwork(self.elements, self.inputs, self.speeds, tuple(locked), self.grid)
+
+    def speed(self) -> float:
+        """Draw a speed of zero or of round-off [rad/s]."""
+        return float(self.rng.choice([0.0, 1.0, -1.0]) * 10.0 ** self.rng.uniform(-17.0, -13.0))
+
+    def torques(self) -> FloatArray:
+        """Draw torques over the samples, none in half of the cases [N m]."""
+        size = float(self.rng.choice([0.0, 10.0 ** self.rng.uniform(-9.0, 2.0)]))
+        return np.asarray(size * self.rng.choice([-1.0, 0.0, 1.0], self.times.size))
+
+    def brake(self, node: str) -> str:
+        """Add a brake that holds a node against any torque drawn; return its name."""
+        pressure = self.input(f"P {len(self.elements)}", np.full(self.times.size, 1e6))
+        law = {"friction": self.friction(), "gain": 1.0, "p0": 0.0, "peak": 1.0}
+        self.add("clutch", a=node, b="ground", **law, pressure=pressure, drum_inertia=0.0)
+        return str(self.elements[-1]["name"])
+
+    def backlash(self) -> None:
+        """Add a coupling, mostly without a gap."""
+        a, b = self.flanges()
+        gap = float(self.rng.choice([0.0, 0.0, 0.0, 1e-3]))
+        stiffness = 10.0 ** float(self.rng.uniform(1.0, 6.0))
+        damping = float(self.rng.choice([0.0, 1e-3])) * stiffness
+        self.add("backlash", a=a, b=b, stiffness=stiffness, damping=damping, gap=gap)

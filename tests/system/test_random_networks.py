@@ -25,6 +25,7 @@ from tests.support.random_network import (
     draw_cancelling_network,
     draw_network,
     draw_plain_network,
+    draw_resting_network,
 )
 
 GRID: FloatArray = np.linspace(0.0, SECONDS, 101)
@@ -49,7 +50,7 @@ def run(network: RandomNetwork, *, audit: bool) -> NetworkRun | None:
     start = Start(network.speeds, locked=network.locked)
     try:
         outputs = [*slips, *speeds, *energies]
-        return simulate(network.elements, inputs, start, GRID, outputs, audit=audit)
+        return simulate(network.elements, inputs, start, network.grid, outputs, audit=audit)
     except InputError as error:
         refusals = ("in the direction that it blocks", "starts locked, but with")
         if not any(text in str(error) for text in refusals):
@@ -147,6 +148,26 @@ def survey_cancelling(seeds: Iterable[int]) -> Counter[str]:
     return outcomes
 
 
+def survey_resting(seeds: Iterable[int]) -> Counter[str]:
+    """Run networks at rest, audited and not; count the outcomes.
+
+    A completed run has a number at every point of its grid.
+    """
+    outcomes: Counter[str] = Counter()
+    for seed in seeds:
+        network = draw_resting_network(seed)
+        for audit in (True, False):
+            done = run(network, audit=audit)
+            outcome = "refused" if done is None else _shorten(done.status)
+            outcomes[outcome] += 1
+            if done is None or done.status != "completed":
+                continue
+            for key, column in done.columns.items():
+                assert column.shape == network.grid.shape, f"seed {seed}: {key}"
+                assert np.isfinite(column).all(), f"seed {seed}: {key} has no number"
+    return outcomes
+
+
 def _shorten(reason: str) -> str:
     """Take numbers and names of elements and members out of a reason."""
     names = r"(clutch|gear|planetary|torque|inertia|prescribed_speed|spring_damper|road_load) \d+"
@@ -167,6 +188,19 @@ def test_networks_whose_ratios_cancel_start_as_stated_and_close_their_balance() 
     outcomes = survey_cancelling(range(150))
     assert (outcomes["missed start"], outcomes["missed balance"]) == (0, 0), outcomes
     assert outcomes["completed"] >= 0.98 * 150, outcomes
+
+
+@pytest.mark.exhaustive
+@pytest.mark.timeout(20_000)
+def test_many_networks_at_rest() -> None:
+    outcomes = survey_resting(range(20_000))
+    # Undamped stiff couplings without a gap may end in a named refusal after thousands of swings.
+    assert not [reason for reason in outcomes if "balance" in reason], outcomes
+    assert outcomes["completed"] >= 0.995 * outcomes.total(), outcomes
+
+
+def test_networks_at_rest_complete_with_a_number_at_every_point() -> None:
+    assert set(survey_resting(range(10))) == {"completed"}
 
 
 def test_random_networks_end_without_overrun_and_close_their_balance() -> None:
