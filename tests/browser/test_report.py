@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from drivetwin.cli.identify_run import IdentifyOptions, run_identification
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run as run_dyno
-from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.result.method import DEFAULT_METHOD
-from drivetwin.report.comparison import save_comparison, simulate_trials
-from drivetwin.report.find_reports import Candidate
+from drivetwin.cli import main
 from drivetwin.report.html import save_report
 from drivetwin.validation.simulate_log import attach_fit
 from tests.browser.watch import grave_findings
@@ -36,14 +31,13 @@ STATE = """() => [...document.querySelectorAll(".plot")].filter((plot) => plot.c
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Report of an identification by the default method."""
     folder = tmp_path_factory.mktemp("report")
-    shift, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=1))
-    outcome = run_identification(shift, IdentifyOptions(vehicle=card, method=DEFAULT_METHOD))
-    save_report(folder / "report.html", outcome.found, outcome.log)
-    twin = {"first": outcome.twin, "second": outcome.twin}
-    trials = simulate_trials(twin, outcome.log, outcome.found.shifts, "shift.csv")
-    candidates = [Candidate.from_twin(name, one) for name, one in twin.items()]
-    save_comparison(folder / "comparison.html", candidates, trials)
-    return folder / "report.html"
+    log, out = folder / "shift.csv", folder / "out"
+    assert main(["synth", "--scenario", "paper_steps", "--seed", "1", "-o", str(log)]) == 0
+    card = str(log.with_suffix(".card.toml"))
+    assert main(["identify", str(log), "--vehicle", card, "-o", str(out)]) == 0
+    twins = [str(shutil.copy(out / "twin.toml", folder / name)) for name in ("a.toml", "b.toml")]
+    assert main(["report", *twins, str(log), "-o", str(out / "comparison.html")]) == 0
+    return out / "report.html"
 
 
 @pytest.fixture(scope="module")

@@ -8,23 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.fleet import parts
 from drivetwin.fleet.friction import compute_fleet_friction
-from drivetwin.fleet.rows import Row, RowKind
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Outcome, State
+from tests.fleet.toys import fill
 
 
 def test_the_middle_and_the_band_are_those_of_the_logs(tmp_path: Path) -> None:
     with Store(tmp_path, write=True) as store:
+        assert compute_fleet_friction(store) == {}
         for number in range(101):
-            log = f"{number:04d}"
             slips = np.linspace(5.0 + 0.01 * number, 100.0 - 0.3 * number, 30)
             level = 0.1 + 1e-4 * number
-            rows = [Row(RowKind.FRICTION, "B3", level + 1e-4 * slip, at=slip) for slip in slips]
-            parts.write_part(store.get_part_path(log), log, Outcome(State.DONE), rows)
-            store.index.add_waiting_log(log, "c", "s", "v")
-            store.index.set_outcome(log, Outcome(State.DONE), 1.0)
+            rows = [("friction", "B3", level + 1e-4 * slip, {"at": slip}) for slip in slips]
+            fill(store, f"{number:04d}", rows)
         curve = compute_fleet_friction(store)["B3"]
     inside = (curve.slip > 10.0) & (curve.slip < 69.0)
     assert np.count_nonzero(inside) > 10
@@ -32,8 +28,3 @@ def test_the_middle_and_the_band_are_those_of_the_logs(tmp_path: Path) -> None:
     assert curve.mu[inside] == pytest.approx(0.105 + law, abs=1e-9)
     assert curve.mu_lo[inside] == pytest.approx(0.10025 + law, abs=1e-9)
     assert curve.mu_hi[inside] == pytest.approx(0.10975 + law, abs=1e-9)
-
-
-def test_a_store_without_friction_has_no_curve(tmp_path: Path) -> None:
-    with Store(tmp_path, write=True) as store:
-        assert compute_fleet_friction(store) == {}

@@ -9,44 +9,48 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin._util.version import get_program_version
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin import Method
+from drivetwin.cli import main
 from drivetwin.errors import FileFormatError, StoreError
-from drivetwin.estimation.result.method import Method
+from drivetwin.fleet import scan
 from drivetwin.fleet.identify import identify_log
-from drivetwin.fleet.rows import RowKind
-from drivetwin.fleet.scan import compute_input_hashes
-from drivetwin.fleet.task import Task, TaskSpec
+from drivetwin.fleet.rules import read_rules
+from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.task import Task
 
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log with a column `TOil` that says 80 and 90 degC in turn, and an empty one, `TGear`."""
     path = tmp_path_factory.mktemp("fleet") / "bench.csv"
-    write_run(path, run(load_scenario("paper_steps"), seed=1))
+    assert main(["synth", "--scenario", "paper_steps", "--seed", "1", "-o", str(path)]) == 0
     head, units, *lines = path.read_text().splitlines()
     filled = [f"{line},{80 + 10 * (k % 2)}," for k, line in enumerate(lines[: len(lines) // 2 * 2])]
     path.write_text("\n".join([f"{head},TOil,TGear", f"{units},degC,degC", *filled]) + "\n")
     return path
 
 
-def _task(log: Path, *means: tuple[str, str]) -> Task:
-    card = str(log.with_suffix(".card.toml"))
-    inputs = compute_input_hashes(card, None)
-    recipe = TaskSpec(card, None, Method.PAPER, inputs, get_program_version(), means)
+def _task(log: Path, *means: tuple[str, str], card: Path | None = None) -> Task:
+    rules = log.with_name("rules.toml")
+    fields = "".join(f'[fields.{name}]\nchannel = "{channel}"\n' for name, channel in means)
+    vehicle = card or log.with_suffix(".card.toml")
+    rules.write_text(f'[[rules]]\nvehicle = "{vehicle}"\n{fields}')
+    made = scan.Scan(read_rules(rules), Method.PAPER)
+    (found,) = made.scan_files(Sources([str(log)]), lambda _: None)
+    assert isinstance(found, scan.Scanned)
+    assert found.recipe is not None
     content = hashlib.sha256(log.read_bytes()).hexdigest()
-    return Task("0123", str(log), content, recipe, str(log.with_suffix(".parquet")))
+    assert found.file.content == content
+    return Task("0123", str(log), content, found.recipe, str(log.with_suffix(".parquet")))
 
 
 def test_a_channel_without_values_leaves_no_field_and_says_so(log: Path) -> None:
     rows = identify_log(_task(log, ("oil_degC", "TOil"), ("gear_degC", "TGear"))).rows
-    (oil,) = [row for row in rows if row.kind is RowKind.FIELD]
+    (oil,) = [row for row in rows if row.kind.value == "field"]
     assert (oil.name, oil.value, oil.si_unit) == ("oil_degC", 85.0, "degC")
     (told,) = [row.reason for row in rows if "TGear" in row.reason]
     assert "no field 'gear_degC'" in told
-    assert any(row.kind is RowKind.PARAMETER for row in rows)
+    assert any(row.kind.value == "parameter" for row in rows)
 
 
 def test_what_cannot_be_written_besides_is_the_stores_fault(log: Path) -> None:
@@ -64,10 +68,9 @@ def test_a_log_that_changed_meanwhile_is_refused(log: Path) -> None:
 
 def test_a_card_that_changed_meanwhile_stops_the_run(log: Path, tmp_path: Path) -> None:
     """The key of a log's rows stands for the card as it was: another one makes other rows."""
-    task = _task(log)
     card = tmp_path / "card.toml"
-    card.write_bytes(Path(task.recipe.vehicle).read_bytes())
-    ours = replace(task, recipe=replace(task.recipe, vehicle=str(card)))
+    card.write_bytes(log.with_suffix(".card.toml").read_bytes())
+    ours = _task(log, card=card)
     assert identify_log(ours).rows
     for text in (card.read_text() + "# corrected\n", "no TOML"):
         card.write_text(text)

@@ -3,27 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from drivetwin.errors import FileFormatError
-from drivetwin.estimation.result.method import DEFAULT_METHOD
-from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.events import Event, Settled, Summary
-from drivetwin.fleet.identify import identify_log
-from drivetwin.fleet.index import FileRow
-from drivetwin.fleet.mixed_model.estimate import estimate_fleet
-from drivetwin.fleet.report import build_vehicle_section, save_fleet_report
-from drivetwin.fleet.rows import RowKind
-from drivetwin.fleet.rules import RulesFile, read_rules
-from drivetwin.fleet.scan import Scan, Scanned
-from drivetwin.fleet.sources import Sources, name_members
-from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import State, Task
-from drivetwin.report.blocks import TableBlock
+from drivetwin.cli import main
+from tests.fleet.toys import contents
 from tests.support.bus_logs import RATIOS, write_log, write_ratio_card
 
 VEHICLES = 6
@@ -44,138 +31,94 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _run(logs: Path, store: Path, **changes: Any) -> tuple[Summary, list[Event]]:
-    events: list[Event] = []
-    request = FleetRun(
-        sources=Sources([str(logs)]),
-        rules=read_rules(logs / RATIOS),
-        store=store,
-        **{"workers": 2, "reports": True, "method": DEFAULT_METHOD, **changes},
-    )
-    return run_fleet(request, events.append), events
+def _run(logs: Path, store: Path, *more: str, rules: str = RATIOS) -> int:
+    command = ["fleet", str(logs), "--vehicle", str(logs / rules), "-o", str(store)]
+    return main([*command, "--workers", "2", "--json", *more])
+
+
+def _read_summary(capsys: pytest.CaptureFixture[str]) -> Any:
+    return json.loads(capsys.readouterr().out.splitlines()[-1])
 
 
 @pytest.fixture(scope="module")
 def store(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("store") / "store"
-    summary, _ = _run(logs, folder)
-    assert (summary.done, summary.computed) == (2 * VEHICLES, VEHICLES)
+    assert _run(logs, folder, "--reports") == 0
     return folder
 
 
 def test_each_vehicle_has_one_result_of_all_its_logs(store: Path) -> None:
-    with Store(store) as opened:
-        rows = opened.read_rows(RowKind.PARAMETER).to_pylist()
-        units = dict(opened.index.select("SELECT log, unit FROM files"))
-        shifts = list(opened.index.select("SELECT log, start_gear, end_gear FROM shifts"))
-    found = {units[one["log"]]: one for one in rows if one["name"] == "f_d_2"}
-    assert len(found) == VEHICLES
-    assert found[ODD]["value"] == pytest.approx(4.0, abs=0.1)
-    assert found["truck_0"]["value"] == pytest.approx(3.0, abs=0.05)
-    assert found["truck_0"]["verdict"] == "identified"  # from one log alone it would be weak
-    assert len(shifts) == 2 * VEHICLES
-    assert {one[1:] for one in shifts} == {("1", "2")}
+    found = contents(store)
+    units = {one["log"]: one["unit"] for one in found["files"]}
+    rows = {units[one["log"]]: one for one in found["rows"] if one["name"] == "f_d_2"}
+    assert (len(found["files"]), len(rows)) == (2 * VEHICLES, VEHICLES)
+    assert rows[ODD]["value"] == pytest.approx(4.0, abs=0.1)
+    assert rows["truck_0"]["value"] == pytest.approx(3.0, abs=0.05)
+    assert rows["truck_0"]["verdict"] == "identified"  # from one log alone it would be weak
+    assert len(found["shifts"]) == 2 * VEHICLES
+    assert {(one["start_gear"], one["end_gear"]) for one in found["shifts"]} == {("1", "2")}
 
 
-def test_nothing_is_computed_again(store: Path, logs: Path) -> None:
-    summary, _ = _run(logs, store)
-    assert (summary.done, summary.computed) == (2 * VEHICLES, 0)
+def test_the_report_lists_vehicles_and_the_odd_one(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fleet", "estimate", str(store), "--parameter", "f_d_2", "--json"]) == 0
+    (one,) = json.loads(capsys.readouterr().out)["estimates"]
+    (odd,) = [unit for unit in one["units"] if unit["odd"]]
+    assert odd["unit"] == ODD
+    assert abs(one["value"] + odd["deviation"] - 4.0) < 0.05
+    assert one["spread_ci95"][0] > 0.1
+    assert main(["fleet", "report", str(store), "--json"]) == 0
+    page = Path(json.loads(capsys.readouterr().out)["report"]).read_text("utf-8")
+    assert f"<h1>Fleet of {VEHICLES} units</h1>" in page
+    for words in ("Vehicles of bus logs", "Units beyond what chance makes", ODD):
+        assert words in page
 
 
-def test_the_report_lists_vehicles_and_the_odd_one(store: Path, tmp_path: Path) -> None:
-    with Store(store) as opened:
-        (one,) = estimate_fleet(opened, ["f_d_2"])
-        section = build_vehicle_section(opened, store)
-        save_fleet_report(opened, tmp_path / "report.html")
-    (odd,) = [unit for unit in one.units if unit.odd]
-    assert odd.unit == ODD
-    assert abs(one.value + odd.deviation - 4.0) < 0.05
-    assert one.spread_ci95 is not None
-    assert one.spread_ci95[0] > 0.1
-    (table,) = section.blocks
-    assert isinstance(table, TableBlock)
-    frequencies = [row for row in table.rows if row[0].note == "f_d_2"]
-    assert [row[1].text for row in frequencies] == [f"truck_{k}" for k in range(VEHICLES)]
-    assert all((store / row[1].href).is_file() for row in frequencies)
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Vehicles of bus logs" in page
-    assert "Units beyond what chance makes" in page
-
-
-def _scan(folder: Path) -> list[Scanned]:
-    scan = Scan(read_rules(folder / RATIOS), DEFAULT_METHOD)
-    nothing: dict[str, FileRow] = {}
-    found = scan.scan_files(Sources([str(folder)]), nothing.get)
-    return [one for one in found if isinstance(one, Scanned)]
-
-
-def _make_vehicle(folder: Path) -> Path:
-    """Two logs of one vehicle in two folders of the same file name."""
-    for day in ("monday", "tuesday"):
-        (folder / day).mkdir(parents=True)
-        write_log(folder / day / "run.csv", len(day))
-    write_ratio_card(folder)
-    return folder
-
-
-def _make_task(folder: Path) -> Task:
-    unit = RulesFile(unit="(vehicle)", rules=read_rules(folder / RATIOS).rules)
-    scan = Scan(unit, DEFAULT_METHOD)
-    nothing: dict[str, FileRow] = {}
-    first, second = scan.scan_files(Sources([str(folder)]), nothing.get)
-    assert isinstance(first, Scanned)
-    assert isinstance(second, Scanned)
-    assert first.file.log == second.file.log
-    assert first.recipe is not None
-    file = first.file
-    return Task(file.log, file.path, file.content, first.recipe, "x", members=first.members)
-
-
-def test_the_key_follows_from_the_logs_of_the_vehicle(logs: Path, tmp_path: Path) -> None:
-    before = {one.file.unit: one.file.log for one in _scan(logs)}
-    assert len(set(before.values())) == VEHICLES
+def test_a_result_is_kept_until_the_logs_of_the_vehicle_change(
+    logs: Path, store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The key follows from the contents, wherever the files are and however many are equal."""
     copy = tmp_path / "copy" / "truck_0"
     copy.mkdir(parents=True)
     write_ratio_card(copy.parent)
     for name in ("run0.csv", "run1.csv"):
         (copy / name).write_bytes((logs / "truck_0" / name).read_bytes())
-    assert {one.file.log for one in _scan(copy.parent)} == {before["truck_0"]}
-    (copy / "again.csv").write_bytes((copy / "run0.csv").read_bytes())
-    (again, *_) = _scan(copy.parent)
-    assert len(again.members) == 2  # a log that is there twice counts once
+    for folder in (logs, copy.parent):
+        assert _run(folder, store) == 0
+        assert _read_summary(capsys)["computed"] == 0
     write_log(copy / "run2.csv", 2)
-    assert before["truck_0"] not in {one.file.log for one in _scan(copy.parent)}
+    (copy / "again.csv").write_bytes((copy / "run0.csv").read_bytes())
+    assert _run(copy.parent, store) == 0
+    assert _read_summary(capsys)["computed"] == 1
+    found = contents(store)
+    (log,) = {one["log"] for one in found["files"] if one["path"] == str(copy / "run2.csv")}
+    assert sum(one["log"] == log for one in found["shifts"]) == 3  # an equal log counts once
 
 
-def test_logs_of_one_name_are_told_apart_and_a_task_crosses_a_pipe(tmp_path: Path) -> None:
-    task = _make_task(_make_vehicle(tmp_path / "vehicle"))
-    assert Task.from_json(task.to_json()) == task
-    assert name_members([path for path, _ in task.members]) == ["monday run.csv", "tuesday run.csv"]
-    found = identify_log(task)
-    assert len(found.shifts) == 2
-
-
-def test_a_log_that_cannot_be_read_leaves_the_others(tmp_path: Path) -> None:
-    folder = _make_vehicle(tmp_path / "vehicle")
-    (folder / "tuesday" / "run.csv").write_text("no log\n", encoding="utf-8")
-    task = _make_task(folder)
-    found = identify_log(task)
-    assert len(found.shifts) == 1
-    assert any("tuesday run.csv is left out" in row.reason for row in found.rows)
-    changed = [(path, "0" * 64) for path, _ in task.members]
-    with pytest.raises(FileFormatError, match="changed while the fleet was at work"):
-        identify_log(replace(task, members=tuple(changed)))
-
-
-def test_a_vehicle_without_a_gear_held_is_bad_with_all_its_logs(logs: Path, tmp_path: Path) -> None:
+def test_logs_of_one_name_are_told_apart_and_an_unreadable_one_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = tmp_path / "vehicle"
-    folder.mkdir()
-    for name in ("run0.csv", "run1.csv"):
-        (folder / name).write_bytes((logs / "truck_0" / name).read_bytes())
+    for day in ("monday", "tuesday"):
+        (folder / day).mkdir(parents=True)
+        write_log(folder / day / "run.csv", len(day))
+    write_ratio_card(folder)
+    rules = f'unit = "(vehicle)"\n[[rules]]\nvehicle = "{RATIOS}"\n'
+    (folder / "rules.toml").write_text(rules, encoding="utf-8")
+    assert _run(folder, tmp_path / "both", rules="rules.toml") == 0
+    assert len(contents(tmp_path / "both")["shifts"]) == 2
+    (folder / "tuesday" / "run.csv").write_text("no log\n", encoding="utf-8")
+    _run(folder, tmp_path / "one", rules="rules.toml")
+    found = contents(tmp_path / "one")
+    assert len(found["shifts"]) == 1
+    assert any("tuesday run.csv is left out" in row["reason"] for row in found["rows"])
     card = '[[gears]]\nname = "9"\nratio = 9.0\n'
     (folder / RATIOS).write_text(card, encoding="utf-8")
-    summary, events = _run(folder, tmp_path / "store")
-    assert (summary.bad, summary.computed) == (2, 1)
-    settled = [one for one in events if isinstance(one, Settled)]
-    assert {one.state for one in settled} == {State.BAD}
-    assert {one.error for one in settled} == {"NoShiftError"}
+    (folder / "tuesday" / "run.csv").write_bytes((folder / "monday" / "run.csv").read_bytes())
+    capsys.readouterr()
+    _run(folder, tmp_path / "none", rules="rules.toml")
+    summary = _read_summary(capsys)
+    assert (summary["bad"], summary["computed"]) == (2, 1)
+    (log,) = contents(tmp_path / "none")["logs"]
+    assert (log["state"], log["error"]) == ("bad", "NoShiftError")

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import RulesError
-from drivetwin.fleet.rows import make_schema
-from drivetwin.fleet.rules import FILE_COLUMNS, parse_field_value, read_rules, select_rule
+from drivetwin.fleet import rules as rules_module
+from drivetwin.fleet.rules import parse_field_value, read_rules
 from drivetwin.fleet.sources import Source
 from tests.fleet.toys import ROOT
 
@@ -34,7 +34,7 @@ def rules_file(tmp_path: Path) -> Path:
 
 def _chosen(rules_file: Path, path: str, channels: frozenset[str] = frozenset()) -> str:
     rules, source = read_rules(rules_file), Source(Path(path))
-    return select_rule(rules, source, rules.get_unit(source), lambda: channels).name
+    return rules_module.select_rule(rules, source, rules.get_unit(source), lambda: channels).name
 
 
 def test_the_first_rule_that_fits_decides(rules_file: Path) -> None:
@@ -100,7 +100,7 @@ def test_faults_of_a_rules_file_are_told(rules_file: Path, text: str, says: str)
         read_rules(rules_file)
 
 
-@pytest.mark.parametrize("name", ["Value", "OIL", *FILE_COLUMNS, *make_schema().names])
+@pytest.mark.parametrize("name", ["Value", "OIL", "unit", "path", "log", "std_noise"])
 def test_no_field_has_the_name_of_a_column(rules_file: Path, name: str) -> None:
     fields = f'[fields.oil]\ncolumn = "a"\n[fields.{name}]\ncolumn = "b"'
     rules_file.write_text(f"[[rules]]\nskip = true\n{fields}")
@@ -132,3 +132,16 @@ def test_dates_are_seconds_since_1970(moment: datetime) -> None:
 def test_a_text_that_is_no_field_is_told(field: str, text: str) -> None:
     with pytest.raises(RulesError, match=text):
         parse_field_value(field, text)
+
+
+def test_readings_are_written_in_words() -> None:
+    """Dates as they were read, numbers with the name of their field."""
+    first, last = parse_field_value("date", "2024-02-29"), parse_field_value("date", "2025-02-28")
+    span = rules_module.format_span
+    assert span("recorded_date", first, last) == "2024-02-29 and 2025-02-28"
+    assert span("odometer_Mm", 119.2543, 123.0) == "119.3 and 123 odometer_Mm"
+    assert span("odometer_km", 98764.0, 123456.0) == "98760 and 123500 odometer_km"
+    factor, per = rules_module.get_drift_unit("recorded_date")
+    assert per == "year"
+    assert factor / (last - first) == pytest.approx(365.25 / 365.0)
+    assert rules_module.get_drift_unit("odometer_Mm") == (1.0, "odometer_Mm")

@@ -12,17 +12,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from drivetwin import Method
 from drivetwin._util.interrupts import interrupt_on_signals
-from drivetwin.estimation.result.method import Method
+from drivetwin.fleet import index, parts, rows, task
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.events import Event, Settled, Summary, to_document
-from drivetwin.fleet.rules import RulesFile, RuleTable
+from drivetwin.fleet.events import to_document
+from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Limits
 
 ROOT = Path(__file__).parents[2]
-LIMITS = Limits(seconds=30.0, memory=200 * 2**20)
 
 
 def make_logs(folder: Path, count: int, *, word: str = "", spoilt: Sequence[str] = ()) -> Path:
@@ -39,11 +38,11 @@ def make_logs(folder: Path, count: int, *, word: str = "", spoilt: Sequence[str]
 
 def request(logs: Path, store: Path, **changes: Any) -> FleetRun:
     """What `drivetwin fleet` would ask, with the toy at work."""
-    rules = RulesFile(rules=[RuleTable(name="toy", vehicle=str(logs / "card.toml"))])
+    rules = read_rules(logs / "card.toml")
     settings: dict[str, Any] = {
         "function": "tests.fleet.work:toy",
-        "time_limit": LIMITS.seconds,
-        "memory_limit": LIMITS.memory,
+        "time_limit": 30.0,
+        "memory_limit": 200 * 2**20,
         "workers": 1,  # its start takes most of the time; tests of the pool ask for two
         "method": Method.PAPER,
         **changes,
@@ -51,9 +50,9 @@ def request(logs: Path, store: Path, **changes: Any) -> FleetRun:
     return FleetRun(sources=Sources([str(logs)]), rules=rules, store=store, **settings)
 
 
-def run_toys(logs: Path, store: Path, **changes: Any) -> tuple[Summary, list[Event]]:
+def run_toys(logs: Path, store: Path, **changes: Any) -> tuple[Any, list[Any]]:
     """Run to the end; the summary and all events."""
-    events: list[Event] = []
+    events: list[Any] = []
     return run_fleet(request(logs, store, **changes), events.append), events
 
 
@@ -64,17 +63,43 @@ def contents(store: Path) -> dict[str, Any]:
         return {**tables, "rows": opened.read_rows().to_pylist()}
 
 
-def names(events: Sequence[Event], **wanted: object) -> list[str]:
+def fill(
+    store: Any,
+    log: str,
+    found: Sequence[tuple[Any, ...]] = (),
+    shifts: Sequence[tuple[Any, ...]] = (),
+    **file: Any,
+) -> None:
+    """Add a log that is done, as a run does: rows as (kind, name, ..., by name), shifts, file."""
+    made = [rows.Row(rows.RowKind(kind), *values, **named) for kind, *values, named in found]
+    outcome = task.Outcome(task.State.DONE, tuple(task.ShiftRow(*one) for one in shifts))
+    parts.write_part(store.get_part_path(log), log, outcome, made)
+    store.index.add_waiting_log(log, "c", "s", "v")
+    store.index.set_outcome(log, outcome, 1.0)
+    if file:
+        path, rule = file.get("path", log), file.get("rule", "")
+        fields = file.get("fields", {})
+        store.index.set_file(index.FileRow(path, log, "c", 1, 1, rule, file["unit"], fields))
+
+
+def count_attempts(store: Path) -> dict[str, int]:
+    """Return the largest number of attempts of a log, by the error of the log."""
+    with Store(store) as opened:
+        return dict(opened.index.select("SELECT error, max(attempts) FROM logs GROUP BY error"))
+
+
+def names(events: Sequence[Any], **wanted: object) -> list[str]:
     """Names of the files that were settled with these attributes."""
     return sorted(
         Path(event.path).stem
         for event in events
-        if isinstance(event, Settled)
+        if hasattr(event, "computed")
+        and hasattr(event, "path")
         and all(getattr(event, key) == value for key, value in wanted.items())
     )
 
 
-def _tell(event: Event) -> None:
+def _tell(event: Any) -> None:
     print(json.dumps(to_document(event)), flush=True)
 
 

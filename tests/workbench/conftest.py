@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from flask.testing import FlaskClient
@@ -15,8 +16,11 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.result.method import Method
+from drivetwin.workbench.access_control import Access
+from drivetwin.workbench.server import build_server
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.sessions import Sessions
+from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace_folder import Folder
 
 LOG, CARD = "bench.csv", "bench.card.toml"
@@ -48,6 +52,21 @@ def identified(place: Path) -> Iterator[Session]:
     finish(one)
     yield one
     sessions.close()
+
+
+@pytest.fixture(scope="module")
+def serve() -> Iterator[Callable[..., Any]]:
+    """Return application and sessions of a server of a folder, whose link has a token."""
+    begun: list[Sessions] = []
+
+    def build(folder: Path, token: str = "right") -> tuple[Any, Sessions]:
+        app, sessions = build_server(Folder.from_path(folder), Start(), Access(token=token))
+        begun.append(sessions)
+        return app, sessions
+
+    yield build
+    for sessions in begun:
+        sessions.close()
 
 
 def finish(session: Session) -> None:

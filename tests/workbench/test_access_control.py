@@ -4,16 +4,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from flask.testing import FlaskClient
 
 from drivetwin.workbench.access_control import KEY_HEADER, Access, is_own_host
-from drivetwin.workbench.server import build_server
-from drivetwin.workbench.views.page import Start
-from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import enter
 
 HERE = "http://127.0.0.1:8050"
@@ -50,11 +48,10 @@ def test_foreign_names(named: str) -> None:
 
 
 @pytest.fixture
-def client(place: Path) -> Iterator[FlaskClient]:
+def client(place: Path, serve: Callable[..., Any]) -> FlaskClient:
     """A browser that has not opened the link."""
-    app, sessions = build_server(Folder.from_path(place), Start(), Access(token="right"))
-    yield app.server.test_client()
-    sessions.close()
+    made: FlaskClient = serve(place)[0].server.test_client()
+    return made
 
 
 @pytest.mark.parametrize("method", ["GET", "POST", "PUT", "DELETE", "OPTIONS", "HEAD"])
@@ -125,11 +122,12 @@ def test_get_serves_no_data(client: FlaskClient) -> None:
     }  # fmt: skip
 
 
-def test_two_workbenches_in_one_browser(client: FlaskClient, place: Path) -> None:
+def test_two_workbenches_in_one_browser(
+    client: FlaskClient, place: Path, serve: Callable[..., Any]
+) -> None:
     """Cookies of a host go to all its ports; each workbench finds its own and no other counts."""
     there = "http://127.0.0.1:8051"
-    app, sessions = build_server(Folder.from_path(place), Start(), Access(token="other"))
-    second = app.server.test_client()
+    second = serve(place, "other")[0].server.test_client()
     enter(client, "right")
     enter(second, "other", there)
     first_cookie = client.get_cookie("drivetwin-8050", domain="127.0.0.1")
@@ -142,7 +140,6 @@ def test_two_workbenches_in_one_browser(client: FlaskClient, place: Path) -> Non
     assert second.get("/", base_url=there).status_code == 200
     second.set_cookie("drivetwin-8051", first_cookie.value, domain="127.0.0.1")
     assert second.get("/", base_url=there).status_code == 403
-    sessions.close()
 
 
 @pytest.mark.parametrize("site", ["same-site", "cross-site"])

@@ -4,27 +4,23 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.authoring.answers import Key
 from drivetwin.authoring.card_edit import list_numbers, replace_numbers
 from drivetwin.errors import CardError, DrivetwinError, InputError, RefusedError
 from drivetwin.vehicle.card import load_card
-from drivetwin.workbench.card_form import CardForm
-from drivetwin.workbench.session import Session
-from drivetwin.workbench.sessions import Sessions
-from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "vehicles"
 
-ANSWERS: dict[Key, str] = {
+ANSWERS: dict[tuple[str, ...], str] = {
     ("name",): "Truck 7",
     ("elements", "B2", "P0_bar"): "0.8+-0.1",
     ("elements", "B2", "form"): "gain",
@@ -37,29 +33,23 @@ ANSWERS: dict[Key, str] = {
 
 
 @pytest.fixture
-def begun(session: Session, tmp_path: Path) -> Iterator[Session]:
+def begun(session: Any, tmp_path: Path, serve: Callable[..., Any]) -> Any:
     """A session in a folder of its own that has begun a card."""
     log = tmp_path / LOG
     log.write_bytes(session.get_folder_source(LOG).path.read_bytes())
-    sessions = Sessions(Folder.from_path(tmp_path))
+    _, sessions = serve(tmp_path)
     begun = sessions.get(sessions.create())
     begun.open(begun.get_folder_source(LOG))
     begun.begin_card()
-    yield begun
-    sessions.close()
+    return begun
 
 
-def _get_form(session: Session) -> CardForm:
-    assert session.form is not None
-    return session.form
-
-
-def _list_keys(form: CardForm) -> list[Key]:
+def _list_keys(form: Any) -> list[Any]:
     return [one.question.key for one in form.entries]
 
 
-def test_answers_open_the_questions_that_follow_from_them(begun: Session) -> None:
-    form = _get_form(begun)
+def test_answers_open_the_questions_that_follow_from_them(begun: Any) -> None:
+    form = begun.form
     assert ("elements", "B2", "gain_m3") not in _list_keys(form)
     form.fill_in({("elements", "B2", "form"): "gain"})
     assert ("elements", "B2", "gain_m3") in _list_keys(form)
@@ -67,8 +57,8 @@ def test_answers_open_the_questions_that_follow_from_them(begun: Session) -> Non
     assert ("elements", "B2", "outer_mm") in _list_keys(form)
 
 
-def test_a_refused_answer_has_its_reason_beside_the_field(begun: Session) -> None:
-    form = _get_form(begun)
+def test_a_refused_answer_has_its_reason_beside_the_field(begun: Any) -> None:
+    form = begun.form
     form.fill_in({("final_drive",): "4,88", ("gears", "names"): "2"})
     faults = {one.question.key: one.fault for one in form.entries}
     assert "write a point" in faults[("final_drive",)]
@@ -77,14 +67,7 @@ def test_a_refused_answer_has_its_reason_beside_the_field(begun: Session) -> Non
     assert not any(one.fault for one in form.entries if one.question.key[0] != "elements")
 
 
-def test_a_contradiction_is_a_fault_of_the_answer_that_made_it(begun: Session) -> None:
-    form = _get_form(begun)
-    form.fill_in({("gearbox",): "zf-8hp70", ("gears", "names"): "1,8"})
-    faults = {one.question.key: one.fault for one in form.entries}
-    assert faults[("gears", "names")]
-
-
-def test_a_complete_form_is_written_and_opened(begun: Session) -> None:
+def test_a_complete_form_is_written_and_opened(begun: Any) -> None:
     source = begun.write_card("truck", ANSWERS, can_replace=False)
     assert source.name == "truck.toml"
     card = load_card(source.path)
@@ -95,10 +78,12 @@ def test_a_complete_form_is_written_and_opened(begun: Session) -> None:
     assert len(begun.work.shifts) == 1
 
 
-def test_an_existing_card_is_replaced_only_on_request(begun: Session) -> None:
+def test_an_existing_card_is_replaced_only_on_request(begun: Any) -> None:
     path = begun.write_card("truck.toml", ANSWERS, can_replace=False).path
     before = path.read_text()
     other = {**ANSWERS, ("name",): "Other"}
+    with pytest.raises(RefusedError):
+        begun.write_card("../truck", ANSWERS, can_replace=False)
     with pytest.raises(RefusedError, match="this file exists"):
         begun.write_card("truck.toml", other, can_replace=False)
     assert path.read_text() == before
@@ -106,19 +91,13 @@ def test_an_existing_card_is_replaced_only_on_request(begun: Session) -> None:
     assert load_card(path).name == "Other"
 
 
-def test_open_answers_are_listed_and_nothing_is_written(begun: Session) -> None:
+def test_open_answers_are_listed_and_nothing_is_written(begun: Any) -> None:
     with pytest.raises(InputError, match="Is the gain of B2 known"):
         begun.write_card("truck.toml", {}, can_replace=False)
     assert not list(begun.folder.root.glob("*.toml"))
 
 
-@pytest.mark.parametrize("name", ["../truck", "", "no/such/folder"])
-def test_a_name_outside_the_folder_is_refused(begun: Session, name: str) -> None:
-    with pytest.raises(RefusedError):
-        begun.write_card(name, ANSWERS, can_replace=False)
-
-
-def test_a_card_needs_to_be_begun(session: Session) -> None:
+def test_a_card_needs_to_be_begun(session: Any) -> None:
     with pytest.raises(InputError, match="no card is begun"):
         session.write_card("truck", ANSWERS, can_replace=False)
 
@@ -141,11 +120,11 @@ TEXTS = st.text(max_size=12) | st.sampled_from(
 
 
 @settings(
-    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
-def test_any_text_is_an_answer_or_a_fault(begun: Session, data: st.DataObject) -> None:
-    form = CardForm(_get_form(begun).survey)
+def test_any_text_is_an_answer_or_a_fault(begun: Any, data: st.DataObject) -> None:
+    form = type(begun.form)(begun.form.survey)
     form.fill_in({})
     for _ in range(2):
         key = data.draw(st.sampled_from(_list_keys(form)))
@@ -154,7 +133,7 @@ def test_any_text_is_an_answer_or_a_fault(begun: Session, data: st.DataObject) -
         assert "[[gears]]" in form.format_card("card.toml")
 
 
-def test_the_open_card_is_edited_in_place(begun: Session, place: Path) -> None:
+def test_the_open_card_is_edited_in_place(begun: Any, place: Path) -> None:
     """All but the changed numbers stays as it was, comments included; a wrong number is refused."""
     session = begun
     shutil.copy(place / CARD, begun.folder.root)

@@ -8,95 +8,69 @@ import json
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from drivetwin.channels.mapping_file import read_mapping
+from drivetwin.cli import main
 from drivetwin.errors import InputError
-from drivetwin.estimation.result.method import Method
-from drivetwin.export.parameters.files import ParameterFormat, read_parameters
 from drivetwin.export.targets import FmiVersion, Target
 from drivetwin.export.write import ExportOptions
-from drivetwin.files.twin_file import load_twin
 from drivetwin.workbench.exports import Record, make_product
-from drivetwin.workbench.identifying import Outcome
-from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import SessionState
-from drivetwin.workbench.views.export import RECORDS
+from drivetwin.workbench.views import export
+
+TARGETS = {
+    "c": b"dt_twin.c",
+    "fmu": b"modelDescription.xml",
+    "modelica": b"Modelica.",
+}
 
 
-@pytest.mark.parametrize("target", [Target(one.value) for one in ParameterFormat])
-def test_parameter_files_are_read_back(identified: Session, tmp_path: Path, target: Target) -> None:
+@pytest.mark.parametrize("wanted", [*TARGETS, "cdfx", "dcm", "csv"])
+def test_models_and_parameters(identified: Any, session: Any, tmp_path: Path, wanted: str) -> None:
+    target = Target(wanted)
     product = make_product(identified.work, ExportOptions(to=target), tmp_path)
-    path = tmp_path / product.name
-    path.write_bytes(product.content)
-    assert any(entry.name.startswith("k_o") for entry in read_parameters(path).entries)
+    assert TARGETS.get(wanted, b"k_o") in product.content
+    assert make_product(identified.work, ExportOptions(to=target), tmp_path) == product
+    assert target.label
+    assert target.text
+    with pytest.raises(InputError):
+        make_product(session.work, ExportOptions(to=target), tmp_path)
 
 
-def test_c_sources_come_as_an_archive(identified: Session, tmp_path: Path) -> None:
-    product = make_product(identified.work, ExportOptions(to=Target.C), tmp_path)
-    names = zipfile.ZipFile(io.BytesIO(product.content)).namelist()
-    assert {"dt_twin.c", "dt_model.h"} <= set(names)
-    assert make_product(identified.work, ExportOptions(to=Target.C), tmp_path) == product
-
-
-@pytest.mark.parametrize(
-    ("target", "says"), [(Target.MODELICA, b"Modelica."), (Target.FMU, b"modelDescription.xml")]
-)
-def test_models_of_the_shift(
-    identified: Session, tmp_path: Path, target: Target, says: bytes
-) -> None:
-    assert says in make_product(identified.work, ExportOptions(to=target), tmp_path).content
-
-
-def test_chosen_options_decide_the_file(identified: Session, tmp_path: Path) -> None:
+def test_chosen_options_decide_the_file(identified: Any, tmp_path: Path) -> None:
     fmi = ExportOptions(to=Target.FMU, fmi=FmiVersion.FMI3)
     packed = io.BytesIO(make_product(identified.work, fmi, tmp_path).content)
-    described = zipfile.ZipFile(packed).read("modelDescription.xml")
-    assert b'fmiVersion="3.0"' in described
+    assert b'fmiVersion="3.0"' in zipfile.ZipFile(packed).read("modelDescription.xml")
 
 
-def test_every_file_has_a_button() -> None:
-    assert all(one.label and one.text for one in Target)
-    assert set(RECORDS) == set(Record)
-
-
-def test_own_files_are_read_back(identified: Session, tmp_path: Path) -> None:
+def test_own_files_are_read_back(identified: Any, session: Any, tmp_path: Path) -> None:
+    assert set(export.RECORDS) == set(Record)
+    made = {one: make_product(identified.work, one, tmp_path) for one in Record}
     twin = tmp_path / "twin.toml"
-    twin.write_bytes(make_product(identified.work, Record.TWIN, tmp_path).content)
-    assert load_twin(twin).parameters.keys() == identified.work.require_twin().parameters.keys()
-    result = json.loads(make_product(identified.work, Record.RESULT, tmp_path).content)
-    assert "k_o" in result["parameters"]
-    mapping = tmp_path / "m.toml"
-    mapping.write_bytes(make_product(identified.work, Record.MAPPING, tmp_path).content)
-    survey = identified.work.require_opened().survey
-    assert read_mapping(mapping).channels == dict(survey.mapping)
-
-
-def test_the_report_is_a_page(identified: Session, tmp_path: Path) -> None:
-    page = make_product(identified.work, Record.REPORT, tmp_path)
+    twin.write_bytes(made[Record.TWIN].content)
+    assert main(["export", str(twin), "--to", "csv", "-o", str(tmp_path / "p.csv")]) == 0
+    assert "k_o" in (tmp_path / "p.csv").read_text()
+    assert "k_o" in json.loads(made[Record.RESULT].content)["parameters"]
+    assert b"[channels" in made[Record.MAPPING].content
+    page = made[Record.REPORT]
     assert page.content.startswith(b"<!DOCTYPE html>")
     assert page.name == "bench.report.html"
-
-
-def test_nothing_to_export_is_told(tmp_path: Path) -> None:
-    for wanted in (*(ExportOptions(to=one) for one in Target), *Record):
+    for one in Record:
         with pytest.raises(InputError):
-            make_product(SessionState(), wanted, tmp_path)
+            make_product(session.work, one, tmp_path)
 
 
-def test_a_twin_from_a_workspace_has_no_report(identified: Session, tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    bare = Outcome(Method.INTEGRAL, identified.work.require_outcome().twins)
-    work = replace(identified.work, results={Method.INTEGRAL: bare})
+def test_a_twin_from_a_workspace_has_no_report(identified: Any, tmp_path: Path) -> None:
+    work = identified.work
+    bare = {method: replace(one, found=None) for method, one in work.results.items()}
     with pytest.raises(InputError, match="identify again"):
-        make_product(work, Record.REPORT, tmp_path)
-    assert make_product(work, Record.TWIN, tmp_path).content
+        make_product(replace(work, results=bare), Record.REPORT, tmp_path)
+    assert make_product(replace(work, results=bare), Record.TWIN, tmp_path).content
 
 
 def test_signals_are_measured_and_simulated_with_the_sliders(
-    identified: Session, tmp_path: Path
+    identified: Any, tmp_path: Path
 ) -> None:
     work = identified.work
     plain = make_product(work, Record.SIGNALS, tmp_path).content.decode()

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+import socket
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -14,13 +16,8 @@ import pytest
 from flask.testing import FlaskClient
 
 from drivetwin.errors import DrivetwinError
-from drivetwin.workbench.access_control import Access
-from drivetwin.workbench.server import SESSION_HEADER, build_server
-from drivetwin.workbench.session import Session
-from drivetwin.workbench.sessions import Sessions
+from drivetwin.workbench.server import SESSION_HEADER, start_server
 from drivetwin.workbench.uploads import LIMITS
-from drivetwin.workbench.views.page import Start
-from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.bad_files import TABLE, bad_files
 from tests.workbench.conftest import CARD, enter
 
@@ -33,7 +30,8 @@ class Bench:
     """A server without a socket, its sessions, and one of them."""
 
     client: FlaskClient
-    sessions: Sessions
+    app: Any
+    sessions: Any
     key: str
 
     def upload(self, name: str, content: bytes, purpose: str = "log", **more: Any) -> Any:
@@ -50,17 +48,16 @@ class Bench:
         return self.client.get("/", base_url="http://127.0.0.1:8050")
 
     @property
-    def session(self) -> Session:
+    def session(self) -> Any:
         return self.sessions.get(self.key)
 
 
 @pytest.fixture(scope="module")
-def bench(place: Path) -> Iterator[Bench]:
-    app, sessions = build_server(Folder.from_path(place), Start(), Access(token=TOKEN))
+def bench(place: Path, serve: Callable[..., Any]) -> Bench:
+    app, sessions = serve(place, TOKEN)
     client = app.server.test_client()
     enter(client, TOKEN)
-    yield Bench(client, sessions, sessions.create())
-    sessions.close()
+    return Bench(client, app, sessions, sessions.create())
 
 
 @pytest.mark.parametrize("kind", BAD)
@@ -74,7 +71,7 @@ def test_a_bad_upload_is_refused_with_a_message_and_the_server_stays(
     assert bench.page().status_code == 200
 
 
-def _opened(session: Session, key: str) -> str:
+def _opened(session: Any, key: str) -> str:
     """What opening an upload is answered with."""
     try:
         session.open(session.get_uploaded(key), session.get_folder_source(CARD))
@@ -82,7 +79,7 @@ def _opened(session: Session, key: str) -> str:
         return str(error)
     opened = session.work.require_opened()
     assert opened.log is None
-    return opened.fault
+    return str(opened.fault)
 
 
 def test_a_claim_of_two_gigabytes_is_refused_unread(bench: Bench) -> None:
@@ -156,3 +153,19 @@ def test_uploads_of_one_session_are_unknown_to_another(bench: Bench) -> None:
     assert bench.session.get_uploaded(key).name == "log.csv"
     with pytest.raises(DrivetwinError):
         other.get_uploaded(key)
+
+
+def test_an_idle_connection_ends(bench: Bench) -> None:
+    server = start_server(bench.app, 0)
+    handler: Any = server.RequestHandlerClass
+    assert 1.0 < handler.timeout < 60.0
+    server.RequestHandlerClass = type("Hasty", (handler,), {"timeout": 0.2})
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    for sent in (b"", b"GET /"):
+        with socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as connection:
+            connection.sendall(sent)
+            assert connection.recv(1) == b""
+    server.shutdown()
+    thread.join()
+    server.server_close()

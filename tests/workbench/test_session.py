@@ -3,36 +3,27 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
 import pytest
 
-from drivetwin.errors import InputError, RefusedError, UnitError
-from drivetwin.estimation.result.method import Method
-from drivetwin.findings import Code, render
-from drivetwin.logs.formats import guarded
+from drivetwin import Method
+from drivetwin.errors import InputError, UnitError
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
-from drivetwin.workbench.phases import Boundary, get_boundary_times
-from drivetwin.workbench.session import MOST_UPLOADS, Session
+from drivetwin.workbench.phases import Boundary
+from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from tests.workbench.conftest import CARD, LOG, finish
+
+SECOND = "second.csv"
 
 
 def _open(session: Session) -> None:
     session.open(session.get_folder_source(LOG), session.get_folder_source(CARD))
-
-
-def test_results_of_all_methods_come_in_and_the_best_is_shown(identified: Session) -> None:
-    work = identified.work
-    assert list(work.results) == [Method.PAPER, Method.INTEGRAL]
-    assert work.method is Method.INTEGRAL
-    found = work.results[Method.INTEGRAL].found
-    assert found is not None
-    assert found.fit["output_torque"]["all"].fit_percent > 80.0
-    assert not work.refusals
 
 
 def test_locks_and_phases_reach_the_identification(session: Session) -> None:
@@ -51,15 +42,6 @@ def test_locks_and_phases_reach_the_identification(session: Session) -> None:
     assert outcome.found.shifts[0].torque_phase[0] == time
 
 
-def test_cancelling_leaves_nothing_running(session: Session) -> None:
-    _open(session)
-    session.identify([Method.INTEGRAL, Method.LIKELIHOOD])
-    session.cancel()
-    assert session.job is None
-    assert session.collect_job_results() is False
-    assert session.work.method is None
-
-
 def test_why_an_identification_ended_early_is_kept_until_the_next(session: Session) -> None:
     _open(session)
     session.identify([Method.INTEGRAL])
@@ -76,24 +58,9 @@ def test_why_an_identification_ended_early_is_kept_until_the_next(session: Sessi
 def test_a_log_is_given_up_after_the_time_for_its_size(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(guarded, "TIME_PER_BYTE", -1.0)
+    monkeypatch.setattr("drivetwin.logs.formats.guarded.TIME_PER_BYTE", -1.0)
     with pytest.raises(InputError, match="was stopped"):
         _open(session)
-
-
-def test_a_correction_reads_the_log_again(session: Session) -> None:
-    _open(session)
-    rows = list_rows(session.work.require_opened().survey)
-    entries = [
-        Entry(one.role, "mbar" if one.role.startswith("pressure") else one.unit, one.reversed)
-        for one in rows
-    ]
-    session.correct_mapping(entries)
-    assert not session.work.shifts
-    with pytest.raises(InputError):
-        session.identify([Method.PAPER])
-    session.correct_mapping([Entry(one.role, one.unit, one.reversed) for one in rows])
-    assert len(session.work.shifts) == 1
 
 
 def test_units_that_a_table_does_not_name_are_proposed_and_stated(
@@ -115,6 +82,13 @@ def test_units_that_a_table_does_not_name_are_proposed_and_stated(
     assert len(session.work.shifts) == 1
     assert session.work.require_log()["input_speed"].time[-1] == pytest.approx(5.0)
     assert session.read_column(0).time[-1] == pytest.approx(5.0)
+    entries = _list_entries(session)
+    with pytest.raises(InputError, match="both"):
+        session.correct_mapping([entries[1], *entries[1:]])
+    with pytest.raises(UnitError, match=r"use one of .*bar"):
+        session.correct_mapping(
+            [replace(one, unit="rpm") if "pressure" in one.role else one for one in entries]
+        )
     session.reopen(session.get_folder_source(session.save("units")))
     assert len(session.work.shifts) == 1
 
@@ -147,17 +121,6 @@ def test_a_recognised_column_can_be_not_used_and_used_again(
     assert unused <= set(session.work.require_log().channels)
 
 
-def test_phases_go_back_to_what_was_detected(session: Session) -> None:
-    _open(session)
-    detected = get_boundary_times(session.work.shifts[0])
-    session.move_boundaries(0, {Boundary.LOCKUP: detected[Boundary.LOCKUP] + 0.01})
-    session.move_boundaries(0, {Boundary.INERTIA: detected[Boundary.INERTIA] + 0.01})
-    assert set(session.work.logs[0].moves[0]) == {Boundary.LOCKUP, Boundary.INERTIA}
-    session.move_boundaries(0, {})
-    assert get_boundary_times(session.work.shifts[0]) == detected
-    assert session.work.logs[0].moves == {}
-
-
 def test_sliders_of_a_session_and_back(identified: Session) -> None:
     before = identified.get_simulation().present.fit
     curves = identified.apply_sliders({"k_o": 1.2e5})
@@ -169,21 +132,6 @@ def test_sliders_of_a_session_and_back(identified: Session) -> None:
     assert identified.get_simulation().present.fit == before
 
 
-def test_opening_another_log_forgets_the_first(session: Session) -> None:
-    _open(session)
-    session.set_lock("eta", Lock(LockKind.FIXED, 0.9))
-    _open(session)
-    assert session.work.locks == {}
-
-
-def test_a_log_that_cannot_be_opened_leaves_the_work_as_it_was(session: Session) -> None:
-    _open(session)
-    work = session.work
-    with pytest.raises(InputError):
-        session.open(session.get_folder_source(CARD), session.get_folder_source(LOG))
-    assert session.work is work
-
-
 def test_what_cannot_be_read_lets_the_identification_run_on(session: Session) -> None:
     _open(session)
     session.identify([Method.PAPER])
@@ -191,6 +139,10 @@ def test_what_cannot_be_read_lets_the_identification_run_on(session: Session) ->
         session.open(session.get_folder_source(CARD), session.get_folder_source(LOG))
     with pytest.raises(InputError):
         session.correct_mapping([Entry("input_speed", "furlong", False)])
+    key = session.store_upload(BytesIO(b"name = 3\n"), "own.csv", None, 10**8)
+    with pytest.raises(InputError, match=r"own\.csv") as caught:
+        session.open_log(session.get_uploaded(key))
+    assert key not in str(caught.value)
     finish(session)
     assert list(session.work.results) == [Method.PAPER]
     session.identify([Method.LIKELIHOOD])
@@ -210,23 +162,15 @@ def test_nothing_is_done_before_a_log_is_open(session: Session) -> None:
             action()
 
 
-def test_old_uploads_are_removed(session: Session) -> None:
-    keys = [session.store_upload(BytesIO(b"x"), f"{k}.csv", 1, 10) for k in range(MOST_UPLOADS + 2)]
-    with pytest.raises(RefusedError):
-        session.get_uploaded(keys[0])
-    assert session.get_uploaded(keys[-1]).path.read_bytes() == b"x"
-    assert len(list(session.scratch.iterdir())) == MOST_UPLOADS
-
-
 def test_uploads_that_are_open_stay_however_many_come_after(session: Session, place: Path) -> None:
     keys = []
     for name in (LOG, CARD):
         with (place / name).open("rb") as stream:
             keys.append(session.store_upload(stream, f"own_{name}", None, 10**8))
     session.open(session.get_uploaded(keys[0]), session.get_uploaded(keys[1]))
-    for k in range(MOST_UPLOADS + 2):
+    for k in range(20):
         session.store_upload(BytesIO(b"x"), f"{k}.csv", 1, 10)
-    assert len(session.uploads) == MOST_UPLOADS
+    assert len(list(session.scratch.glob("*"))) < 12
     name = session.save("own")
     session.reopen(session.get_folder_source(name))
     assert len(session.work.shifts) == 1
@@ -234,26 +178,13 @@ def test_uploads_that_are_open_stay_however_many_come_after(session: Session, pl
     assert keys[0] not in session.uploads
 
 
-def test_the_sample_opens_with_its_card(session: Session) -> None:
-    session.open_sample()
-    assert len(session.work.shifts) == 1
-    assert not session.work.require_opened().doubts
-
-
 def test_a_log_without_a_card_has_its_pressures_by_label(session: Session) -> None:
     session.open(session.get_folder_source(LOG))
     work = session.work
     assert {"pressure.B2", "pressure.B3"} <= set(work.require_log().channels)
-    assert "the vehicle card" not in " ".join(render(work.require_log().findings))
     assert not work.shifts
     with pytest.raises(InputError, match="no vehicle card"):
         session.identify([Method.PAPER])
-
-
-def test_another_log_keeps_the_card(session: Session) -> None:
-    _open(session)
-    session.open_log(session.get_folder_source(LOG))
-    assert len(session.work.shifts) == 1
 
 
 def test_corrections_of_elements_that_a_card_lacks_are_left_out(session: Session) -> None:
@@ -293,7 +224,10 @@ def test_the_mapping_of_the_project_folder_is_used(session: Session, tmp_path: P
     )
     plain = session.work.require_log()["output_torque"].time
     session.open(Source(LOG, log))
-    assert session.work.require_log()["output_torque"].time == pytest.approx(plain + 0.25)
+    shifted = session.work.require_log()["output_torque"].time
+    assert shifted == pytest.approx(plain + 0.25)
+    session.correct_mapping(_list_entries(session))
+    assert session.work.require_log()["output_torque"].time == pytest.approx(shifted)
 
 
 def test_a_mapping_that_fits_no_column_is_reported_and_not_applied(
@@ -307,7 +241,73 @@ def test_a_mapping_that_fits_no_column_is_reported_and_not_applied(
     opened = session.work.require_opened()
     assert not opened.fault
     found = session.work.require_log()
-    (finding,) = [one for one in found.findings if one.code is Code.MAPPING_NOT_APPLIED]
-    assert "channels.toml" in finding.text
+    (finding,) = [one for one in found.findings if "channels.toml" in one.text]
     assert "of another log" in finding.text
     assert "output_torque" in found.channels
+
+
+@pytest.fixture
+def several(session: Session, place: Path) -> Session:
+    """A session with two logs of one vehicle, the first selected."""
+    shutil.copyfile(place / LOG, place / SECOND)
+    _open(session)
+    rows = _list_entries(session)
+    session.correct_mapping(
+        [replace(one, unit="1/min" if one.unit == "rpm" else one.unit) for one in rows]
+    )
+    session.add_log(session.get_folder_source(SECOND))
+    return session
+
+
+def test_a_held_out_log_is_predicted_and_has_no_twin(several: Session) -> None:
+    several.identify([Method.PAPER])
+    finish(several)
+    assert "one log at a time" in several.work.refusals[Method.PAPER]
+    several.hold_out([frozenset(), frozenset({0})])
+    several.identify([Method.PAPER])
+    finish(several)
+    outcome = several.work.require_outcome()
+    assert list(outcome.twins) == [LOG]
+    assert outcome.found is not None
+    (held,) = outcome.found.evidence.held_out
+    assert held.source == SECOND
+    several.select_log(1)
+    with pytest.raises(InputError, match=r"no shift of second\.csv was fitted"):
+        several.get_simulation()
+    several.select_log(0)
+    assert several.get_simulation().present.fit
+
+
+def test_several_logs_are_corrected_saved_removed_and_limited(several: Session) -> None:
+    first, second = several.work.logs
+    assert first.corrections == second.corrections
+    assert second.corrections.channels["wheel_speed"].unit == "1/min"
+    several.hold_out([frozenset(), frozenset({0})])
+    several.select_log(1)
+    time = several.work.require_shift().torque_phase[0] - 0.004
+    several.move_boundaries(0, {Boundary.TORQUE: time})
+    assert several.work.logs[0].moves == {}
+    assert several.work.build_sources()[1].shifts.shifts[0].torque_phase[0] == time
+    name, before = several.save("several"), several.work
+    several.open(several.get_folder_source(LOG))
+    several.reopen(several.get_folder_source(name))
+    after = several.work
+    for attribute in ("source", "held", "moves"):
+        assert [getattr(one, attribute) for one in after.logs] == [
+            getattr(one, attribute) for one in before.logs
+        ]
+    assert after.at == 1
+    none: frozenset[int] = frozenset()
+    for held in ([], [none], [frozenset({3}), none]):
+        with pytest.raises(InputError, match="no such shift"):
+            several.hold_out(held)
+    with pytest.raises(InputError, match="is open"):
+        several.add_log(several.get_folder_source(SECOND))
+    several.work = replace(after, logs=after.logs * 100)
+    with pytest.raises(InputError, match="limit"):
+        several.add_log(Source("other.csv", several.get_folder_source(SECOND).path))
+    several.work = after
+    several.remove_log(0)
+    assert [one.source.name for one in several.work.logs] == [SECOND]
+    with pytest.raises(InputError, match="no such log"):
+        several.remove_log(0)

@@ -13,13 +13,12 @@ from typing import Any
 
 import pytest
 
+from drivetwin import Method
 from drivetwin.errors import RefusedError
-from drivetwin.estimation.result.method import Method
 from drivetwin.vehicle.locks import Lock, LockKind
-from drivetwin.workbench.phases import Boundary, get_boundary_times
+from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.sessions import Sessions
-from drivetwin.workbench.workspace import load_workspace
 from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG
 
@@ -27,8 +26,8 @@ from tests.workbench.conftest import CARD, LOG
 @pytest.fixture(scope="module")
 def saved(identified: Session) -> Iterator[Path]:
     """A workspace with a moved boundary, a lock and a slider."""
-    times = get_boundary_times(identified.work.shifts[0])
-    identified.move_boundaries(0, {Boundary.INERTIA: times[Boundary.INERTIA] + 0.003})
+    time = identified.work.shifts[0].inertia_phase[0] + 0.003
+    identified.move_boundaries(0, {Boundary.INERTIA: time})
     identified.set_lock("k_o", Lock(LockKind.PRIOR, 1.7e5, 2e3))
     identified.apply_sliders({"k_o": 1.5e5, "mu.B3": 1.05})
     name = identified.save("test")
@@ -48,7 +47,7 @@ def test_a_reopened_workspace_goes_on_where_it_was(
     assert after.changes == {"k_o": 1.5e5, "mu.B3": 1.05}
     assert after.method is before.method
     assert list(after.results) == list(before.results)
-    assert get_boundary_times(after.shifts[0]) == get_boundary_times(before.shifts[0])
+    assert after.shifts[0].inertia_phase == before.shifts[0].inertia_phase
     fits = [
         one.get_simulation().present.fit["output_torque"]["all"] for one in (identified, session)
     ]
@@ -87,14 +86,14 @@ def _without(key: str) -> Callable[[dict[str, Any]], object]:
     ],
 )
 def test_a_damaged_key_is_named(
-    saved: Path, tmp_path: Path, damage: Callable[[dict[str, Any]], object], says: str
+    session: Session, saved: Path, damage: Callable[[dict[str, Any]], object], says: str
 ) -> None:
     content = json.loads(saved.read_text())
     damage(content)
-    path = tmp_path / "w.workspace.json"
-    path.write_text(json.dumps(content))
+    crafted = saved.with_name("damaged.workspace.json")
+    crafted.write_text(json.dumps(content))
     with pytest.raises(RefusedError, match=says):
-        load_workspace(path, path.name)
+        session.reopen(session.get_folder_source(crafted.name))
 
 
 class _Runs:
@@ -106,11 +105,10 @@ class _Runs:
     "content",
     [b"", b"{", b"[]", b"\x00\xff", pickle.dumps(_Runs()), b"[" * 100_000, b'{"version": 1e999}'],
 )
-def test_what_is_no_workspace_is_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "w.workspace.json"
-    path.write_bytes(content)
+def test_what_is_no_workspace_is_refused(session: Session, saved: Path, content: bytes) -> None:
+    saved.with_name("none.workspace.json").write_bytes(content)
     with pytest.raises(RefusedError):
-        load_workspace(path, path.name)
+        session.reopen(session.get_folder_source("none.workspace.json"))
 
 
 @pytest.mark.parametrize("path", ["../bench.csv", "/etc/passwd", "absent.csv"])

@@ -11,7 +11,6 @@ import pytest
 
 from drivetwin._util.display_units import NM
 from drivetwin.report.figures.stack import Curve, Panel
-from drivetwin.workbench.session import Session
 from drivetwin.workbench.zoom import collect_curves, parse_view
 from tests.support.arrays import FloatArray
 
@@ -48,15 +47,7 @@ def test_every_sample_in_view_is_sent(start: float) -> None:
     assert np.diff(inside) == pytest.approx(1e-3, abs=1e-4)
 
 
-def test_large_values_keep_their_steps() -> None:
-    time: FloatArray = np.arange(100, dtype=np.float64)
-    curve = Curve("clock", time, 1.7e9 + time, "#000")
-    (sent,) = collect_curves([Panel("clock", NM, [curve])], (0.0, 99.0)).values()
-    y = np.frombuffer(base64.b64decode(sent["y"]["bdata"]), sent["y"]["dtype"])
-    assert np.diff(y) == pytest.approx(1.0)
-
-
-def test_the_only_shift_in_the_window_is_selected(identified: Session) -> None:
+def test_the_only_shift_in_the_window_is_selected(identified: Any) -> None:
     lockup = identified.work.require_shift().lockup_time
     assert not identified.set_view((lockup - 0.1, lockup + 0.1))
     assert identified.view == (lockup - 0.1, lockup + 0.1)

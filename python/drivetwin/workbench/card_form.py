@@ -29,15 +29,6 @@ class CardForm:
     entries: list[FormEntry] = field(default_factory=list)
     _estimates: dict[object, LogEstimates] = field(default_factory=dict)
 
-    def __getstate__(self) -> dict[str, object]:
-        """Return what is stored: the entries contain functions and follow from the texts."""
-        return {**vars(self), "entries": []}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        """Restore the form."""
-        vars(self).update(state)
-        self.fill_in({})
-
     def fill_in(self, texts: Mapping[Key, str]) -> None:
         """Take the texts of some fields, and ask the questions that follow."""
         self.texts = {**self.texts, **texts}

@@ -12,11 +12,11 @@ from pathlib import Path
 from dash import Dash
 from dash.exceptions import DependencyException
 from flask import Response, request
+from werkzeug.serving import ThreadedWSGIServer, WSGIRequestHandler
 
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.workbench import jobs
 from drivetwin.workbench.access_control import ADDRESS, Access, make_refusal, protect
-from drivetwin.workbench.connections import BoundedServer
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_callback_requests, escape_callback_responses
@@ -24,6 +24,13 @@ from drivetwin.workbench.views.page import Start, build_page
 from drivetwin.workbench.workspace_folder import Folder
 
 SESSION_HEADER = "X-Drivetwin-Session"
+
+
+class _Handler(WSGIRequestHandler):
+    """Handler of one connection, which has one request."""
+
+    protocol_version = "HTTP/1.1"
+    timeout = 10.0  # s without a byte from the browser, which sends without pauses
 
 
 def build_server(folder: Folder, start: Start, access: Access) -> tuple[Dash, Sessions]:
@@ -51,7 +58,7 @@ def build_server(folder: Folder, start: Start, access: Access) -> tuple[Dash, Se
     return app, sessions
 
 
-def start_server(app: Dash, port: int) -> BoundedServer:
+def start_server(app: Dash, port: int) -> ThreadedWSGIServer:
     """A server on `port` (0: any free one) of this machine, not yet serving.
 
     Raises InputError where it cannot listen there.
@@ -65,7 +72,7 @@ def start_server(app: Dash, port: int) -> BoundedServer:
         ) from None
     jobs.warm_up()
     with bound:
-        return BoundedServer(ADDRESS, port, app.server, fd=bound.fileno())
+        return ThreadedWSGIServer(ADDRESS, port, app.server, _Handler, fd=bound.fileno())
 
 
 def _register_uploads(app: Dash, sessions: Sessions) -> None:
@@ -77,8 +84,8 @@ def _register_uploads(app: Dash, sessions: Sessions) -> None:
         request.max_content_length = sys.maxsize  # counted while it is received
         name = request.args.get("name", "")
         try:
-            with sessions.use(request.headers.get(SESSION_HEADER)) as session:
-                key = session.store_upload(request.stream, name, request.content_length, limit)
+            session = sessions.get(request.headers.get(SESSION_HEADER))
+            key = session.store_upload(request.stream, name, request.content_length, limit)
         except RefusedError as error:
             return make_refusal(400, str(error))
         return Response(json.dumps({"key": key, "name": name}), mimetype="application/json")

@@ -3,18 +3,15 @@
 
 from __future__ import annotations
 
-import pickle
 import secrets
 import shutil
 import threading
-import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any
 
-from drivetwin._util.atomic import write_bytes, write_text
+from drivetwin._util.atomic import write_text
 from drivetwin.authoring import card_edit
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.card_text import refuse_faults
@@ -47,11 +44,6 @@ Above `MOST_LOGS`, as all logs and the card may be uploads.
 """
 
 
-_STORED = "session.pickle"
-_KEPT = ("work", "uploads", "form", "view")
-"""Attributes of a session that are stored; all else is computed again."""
-
-
 @dataclass(frozen=True, eq=False)
 class Live:
     """State of the sliders' simulation: identified run, present run and the figure of both."""
@@ -74,9 +66,6 @@ class Session:
     form: CardForm | None = None
     preview: tuple[ColumnKey, Preview] | None = None
     view: View | None = None
-    used: float = field(default_factory=time.monotonic)
-    users: int = 0
-    """Number of requests that act on the session at present."""
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     def store_upload(self, stream: IO[bytes], name: str, claimed: int | None, limit: int) -> str:
@@ -369,30 +358,6 @@ class Session:
             work = workspace.restore_workspace(content, SessionState(logs=read, card=card))
             self.cancel()
             self._set(work)
-
-    def is_idle(self) -> bool:
-        """Return True if no request acts on the session and no job of it runs."""
-        if self.users:
-            return False
-        with suppress(InputError):  # the reason stays in the work
-            self.collect_job_results()
-        return self.job is None
-
-    def store(self) -> None:
-        """Write the session to its scratch folder, which only this user can read.
-
-        Raises OSError, and then the session is as it was.
-        """
-        content = pickle.dumps({name: getattr(self, name) for name in _KEPT})
-        write_bytes(self.scratch / _STORED, content)
-
-    @classmethod
-    def restore(cls, folder: Folder, scratch: Path) -> Session:
-        """Read a session that `store` wrote during this run of the program. Raises OSError."""
-        path = scratch / _STORED
-        kept = pickle.loads(path.read_bytes())
-        path.unlink()
-        return cls(folder, scratch, **kept)
 
     def close(self) -> None:
         """Stop what runs and remove the scratch folder."""

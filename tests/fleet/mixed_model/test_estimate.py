@@ -3,44 +3,40 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.fleet import parts
-from drivetwin.fleet.index import FileRow
-from drivetwin.fleet.mixed_model.estimate import estimate_fleet, estimate_parameter
-from drivetwin.fleet.mixed_model.observations import collect_facts, collect_observations
-from drivetwin.fleet.mixed_model.result import JointEstimate
-from drivetwin.fleet.rows import Row, RowKind
+from drivetwin.fleet.mixed_model.estimate import estimate_fleet
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Outcome, State
+from tests.fleet.toys import fill
 
 UNITS, LOGS = 15, 30
 DRIFT = -4e-5
+DESIGN = Verdict.DESIGN.value
 STRAY = "00000123"
 
 
-def _value_row(name: str, value: float, std: float, **more: float) -> Row:
-    row = Row(RowKind.PARAMETER, name, value, std, std, verdict=Verdict.IDENTIFIED.value)
-    return replace(row, **more)  # type: ignore[arg-type]
+def _value_row(name: str, value: float, std: float, **more: float) -> tuple[Any, ...]:
+    return ("parameter", name, value, std, std, {"verdict": "identified", **more})
 
 
-def _rows(mu: float, log: str, draws: np.random.Generator) -> list[Row]:
+def _rows(mu: float, log: str, draws: np.random.Generator) -> list[tuple[Any, ...]]:
     fit = 60.0 if log == STRAY else 95.0 + draws.normal()
     return [
         _value_row("mu.B3", mu, 1e-3),
         _value_row("eta", 0.85 + 1e-3 * draws.normal(), 1e-3),
         _value_row("P0.B3", 8e4, 0.0, free_value=8.2e4 + 1e3 * draws.normal(), free_std=1e3),
-        Row(RowKind.PARAMETER, "P0.B2", 8e4, 0.0, 0.0, verdict=Verdict.DESIGN.value),
-        Row(RowKind.FIT, "output_torque.all.fit_percent", fit),
-        Row(RowKind.FIELD, "oil_degC", 80.0 + 5.0 * draws.normal()),
-        *([Row(RowKind.WARNING, "", reason="the sensor sticks")] if log == STRAY else []),
+        ("parameter", "P0.B2", 8e4, 0.0, 0.0, {"verdict": DESIGN}),
+        ("fit", "output_torque.all.fit_percent", fit, {}),
+        ("field", "oil_degC", 80.0 + 5.0 * draws.normal(), {}),
+        *([("warning", "", {"reason": "the sensor sticks"})] if log == STRAY else []),
     ]
 
 
@@ -57,29 +53,24 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
             mu = level[unit] + DRIFT * (reading - 100.0) + 1e-3 * draws.normal()
             mu += 0.012 if unit == 7 and reading >= 120.0 else 0.0
             mu += 0.02 if log == STRAY else 0.0
-            fields = {"odometer": reading}
-            file = FileRow(f"/l/{log}.csv", log, "c", 1, 1, "trucks", f"T{unit}", fields)
-            opened.index.set_file(file)
-            opened.index.add_waiting_log(log, "c", "s", "v")
-            outcome = Outcome(State.DONE)
-            parts.write_part(opened.get_part_path(log), log, outcome, _rows(mu, log, draws))
-            opened.index.set_outcome(log, outcome, 1.0)
+            file: dict[str, Any] = {"path": f"/l/{log}.csv", "rule": "trucks", "unit": f"T{unit}"}
+            fill(opened, log, _rows(mu, log, draws), **file, fields={"odometer": reading})
         opened.compact()
         yield opened
 
 
 @pytest.fixture(scope="module")
-def found(store: Store) -> dict[str, JointEstimate]:
+def found(store: Store) -> dict[str, Any]:
     """All joint estimates, by parameter."""
     return {one.parameter: one for one in estimate_fleet(store)}
 
 
-def test_only_what_logs_tell_is_estimated(found: dict[str, JointEstimate]) -> None:
+def test_only_what_logs_tell_is_estimated(found: dict[str, Any]) -> None:
     assert set(found) == {"mu.B3", "eta", "P0.B3"}
     assert {one.rule for one in found.values()} == {"trucks"}
 
 
-def test_drift_and_level_are_within_their_intervals(found: dict[str, JointEstimate]) -> None:
+def test_drift_and_level_are_within_their_intervals(found: dict[str, Any]) -> None:
     mu = found["mu.B3"]
     drift = mu.drifts[0]
     assert drift.field == "odometer"
@@ -94,13 +85,13 @@ def test_drift_and_level_are_within_their_intervals(found: dict[str, JointEstima
     assert eta.spread_ci95[0] == 0.0
 
 
-def test_the_cards_design_value_does_not_count(found: dict[str, JointEstimate]) -> None:
+def test_the_cards_design_value_does_not_count(found: dict[str, Any]) -> None:
     P0 = found["P0.B3"]
     assert P0.ci95[0] < 8.2e4 < P0.ci95[1]
     assert P0.ci95[0] > 8.05e4
 
 
-def test_the_unit_that_changed_is_found(found: dict[str, JointEstimate]) -> None:
+def test_the_unit_that_changed_is_found(found: dict[str, Any]) -> None:
     (change,) = found["mu.B3"].changes
     assert change.unit == "T7"
     assert change.before < 120.0 <= change.after
@@ -109,22 +100,27 @@ def test_the_unit_that_changed_is_found(found: dict[str, JointEstimate]) -> None
     assert since == [None, change.after]
 
 
-def test_a_unit_beyond_the_others_is_odd(found: dict[str, JointEstimate]) -> None:
+def test_a_unit_beyond_the_others_is_odd(found: dict[str, Any]) -> None:
     odd = [(unit.unit, unit.since is None) for unit in found["mu.B3"].units if unit.odd]
     assert odd == [("T4", True), ("T7", False)]
     assert not any(unit.odd for unit in found["eta"].units)
 
 
 def test_an_odd_unit_is_told_by_the_command(
-    store: Store, capsys: pytest.CaptureFixture[str]
+    store: Store, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["fleet", "estimate", str(store.folder), "--parameter", "mu.B3"]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "Units beyond what chance makes. They count in shared value and spread." in told
     assert "T4 μ (B3) 0.0455" in told
+    page = tmp_path / "page.html"
+    assert main(["fleet", "report", str(store.folder), "-o", str(page)]) == 0
+    text = page.read_text("utf-8")
+    assert f"<h1>Fleet of {UNITS} units</h1>" in text
+    assert re.search(r"drifts by −[\d.]+ % between [\d.]+ and [\d.]+ odometer", text)
 
 
-def test_a_stray_log_is_named_with_the_reason(found: dict[str, JointEstimate]) -> None:
+def test_a_stray_log_is_named_with_the_reason(found: dict[str, Any]) -> None:
     (outlier,) = found["mu.B3"].outliers
     assert outlier.log == STRAY
     assert outlier.score > 8.0
@@ -133,36 +129,8 @@ def test_a_stray_log_is_named_with_the_reason(found: dict[str, JointEstimate]) -
     assert not found["eta"].outliers
 
 
-def test_one_parameter_may_be_asked_for(store: Store) -> None:
-    assert [one.parameter for one in estimate_fleet(store, ["eta"])] == ["eta"]
-
-
-def test_an_estimate_is_a_document(found: dict[str, JointEstimate]) -> None:
-    document = found["mu.B3"].to_document()
-    assert document["changes"][0]["unit"] == "T7"
-    assert "points" not in document
-
-
-def test_settings_that_differ_are_told(store: Store) -> None:
-    known = collect_facts(store)
-    (seen,) = [one for one in collect_observations(store, known) if one.parameter == "eta"]
-    plain = {log: fact for log, (_, fact) in known.items()}
-    one = estimate_parameter(seen, plain)
-    assert one is not None
-    assert not one.notes
-    older = {seen.logs[0]: replace(plain[seen.logs[0]], settings="older")}
-    mixed = estimate_parameter(seen, {**plain, **older})
-    assert mixed is not None
-    assert mixed.notes[0].startswith("logs identified with 2 different settings")
-
-
 def test_too_few_logs_give_no_estimate(tmp_path: Path) -> None:
     with Store(tmp_path, write=True) as opened:
         for log in ("00", "01"):
-            opened.index.set_file(FileRow(log, log, "c", 1, 1, "r", "u", {}))
-            opened.index.add_waiting_log(log, "c", "s", "v")
-            parts.write_part(
-                opened.get_part_path(log), log, Outcome(State.DONE), [_value_row("eta", 0.8, 0.1)]
-            )
-            opened.index.set_outcome(log, Outcome(State.DONE), 1.0)
+            fill(opened, log, [_value_row("eta", 0.8, 0.1)], unit="u", rule="r")
         assert estimate_fleet(opened) == []

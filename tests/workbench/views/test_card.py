@@ -5,32 +5,30 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from drivetwin.files.twin_file import save_twin
-from drivetwin.workbench.access_control import Access
-from drivetwin.workbench.server import build_server
-from drivetwin.workbench.session import Session
 from drivetwin.workbench.views.card import is_card
-from drivetwin.workbench.views.page import Start
-from drivetwin.workbench.workspace_folder import Folder
 
 ROOT = Path(__file__).resolve().parents[3]
 VEHICLES = sorted((ROOT / "examples" / "vehicles").glob("*.toml"))
 OTHERS = sorted((ROOT / "python" / "drivetwin" / "gearbox" / "cards").glob("*.toml"))
 
 
-def test_the_cards_of_the_folder_have_a_button(tmp_path: Path, identified: Session) -> None:
+def test_the_cards_of_the_folder_have_a_button(
+    tmp_path: Path, identified: Any, serve: Callable[..., Any]
+) -> None:
     for path in (*VEHICLES, *OTHERS):
         shutil.copy(path, tmp_path)
     save_twin(tmp_path / "twin.toml", identified.work.require_twin())
     (tmp_path / "channels.toml").write_text('[channels]\noutput_speed = "n"\n')
-    app, sessions = build_server(Folder.from_path(tmp_path), Start(), Access())
+    app, sessions = serve(tmp_path)
     (drawn,) = [one for key, one in app.callback_map.items() if "card-content" in key]
     *_, offered, files = drawn["callback"].__wrapped__("1", sessions.create())
-    sessions.close()
     names = [path.name for path in VEHICLES]
     assert len(names) > 5
     assert [button.children for button in files[1].children] == names

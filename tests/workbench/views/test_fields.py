@@ -4,26 +4,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from dash import Dash
 
-from drivetwin.workbench.access_control import Access
-from drivetwin.workbench.server import build_server
-from drivetwin.workbench.views.page import Start
-from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG, enter
 
 HERE = "http://127.0.0.1:8050"
 DAILY: tuple[Any, ...] = (
-    None, True, -1, 10**400, float("nan"), "", "x", "\ud800", "../" * 50, [], ["x"], {}, {"id": []},
-    {"shapes[0].x0": 10**400},
+    None, -1, 10**400, float("nan"), "\ud800", "../" * 50, ["x"], {"shapes[0].x0": 10**400},
 )  # fmt: skip
 """Values of each type."""
 REPEATS: tuple[Any, ...] = (
+    True, "", "x", [], {}, {"id": []},
     0, 3.5, 1e308, float("inf"), "\0", "/", "a" * 10_000, "\x1b[2J", "-1", "1e999", "\u0661",
     [[]], [None], {"key": 1}, {"key": "x", "name": {}}, {"shapes[0].x0": "x"},
 )  # fmt: skip
@@ -34,12 +29,9 @@ LABELS = [f"{number}-{str(one)[:12]!a}" for number, one in enumerate([*DAILY, *R
 class Bench:
     """A server without a socket and the key of a session that holds a log."""
 
-    def __init__(self, place: Path) -> None:
+    def __init__(self, app: Any, sessions: Any) -> None:
         """Open the log."""
-        self.app: Dash
-        self.app, self.sessions = build_server(
-            Folder.from_path(place), Start(), Access(token="right")
-        )
+        self.app, self.sessions = app, sessions
         self.client = self.app.server.test_client()
         enter(self.client, "right")
         self.client.get("/_dash-dependencies", base_url=HERE)
@@ -95,10 +87,8 @@ def _make_outputs(output: str) -> Any:
 
 
 @pytest.fixture(scope="module")
-def bench(place: Path) -> Iterator[Bench]:
-    made = Bench(place)
-    yield made
-    made.sessions.close()
+def bench(place: Path, serve: Callable[..., Any]) -> Bench:
+    return Bench(*serve(place))
 
 
 @pytest.mark.parametrize("value", VALUES, ids=LABELS)

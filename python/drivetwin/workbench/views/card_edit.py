@@ -12,10 +12,9 @@ from dash.development.base_component import Component
 from pydantic import BaseModel
 
 from drivetwin.authoring.card_edit import Path, format_path, list_numbers
-from drivetwin.errors import RefusedError
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.card_form import EXISTING
+from drivetwin.workbench.views.card_form import build_writing, collect_texts, open_written
 
 
 class EntryId(BaseModel, strict=True):
@@ -42,7 +41,7 @@ def register(page: ui.Page) -> None:
 
     @page.callback(
         Input("write-edited", "n_clicks"),
-        State("edited-name", "value"),
+        State("name-edited", "value"),
         State("replace-edited", "data-value"),
         State({"entry": ALL}, "value"),
         State({"entry": ALL}, "id"),
@@ -59,13 +58,11 @@ def register(page: ui.Page) -> None:
         """Write the card with the typed numbers and open it."""
         if not clicks:
             return
-        typed = {
-            _parse_path(one.entry): value or "" for value, one in zip(values, ids, strict=True)
-        }
-        source = session.write_edited_card(name or "", typed, can_replace=existing == "replace")
-        session.open_card(source)
-        ui.notify_topic(ui.Topic.LOG)
-        ui.notify_opened_log(f"{source.name} is written and open", session.work.require_open_log())
+        typed = collect_texts(values, [one.entry for one in ids])
+        open_written(
+            session,
+            session.write_edited_card(name or "", typed, can_replace=existing == "replace"),
+        )
 
 
 def _build_form(name: str, numbers: dict[Path, str]) -> list[Component]:
@@ -82,24 +79,6 @@ def _build_form(name: str, numbers: dict[Path, str]) -> list[Component]:
             "deviation, or LOW..HIGH. Comments and all other entries stay."
         ),
         html.Div(fields, className="entries"),
-        ui.make_row(
-            html.Div(
-                ui.make_field("edited-name", "Name of the edited card", type="text", value=name),
-                className="wide",
-            ),
-            ui.make_choice("replace-edited", "If this file exists", EXISTING, "keep"),
-            ui.make_button("Write and open the edited card", "write-edited"),
-        ),
+        build_writing("edited", "Name of the edited card", name, "Write and open the edited card"),
     ]
     return [html.Details(form, id="edit-form")]
-
-
-def _parse_path(text: str) -> Path:
-    """Return the place of an entry. Raises RefusedError for an id that is none."""
-    try:
-        path = json.loads(text)
-    except (ValueError, RecursionError):
-        path = None
-    if not isinstance(path, list) or not all(isinstance(part, str | int) for part in path):
-        raise RefusedError("the request names no entry of the card", "load the page again")
-    return tuple(path)

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 from dash import ALL, Input, Output, State, ctx, html, no_update
 from dash.development.base_component import Component
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from drivetwin.authoring.answers import Key
 from drivetwin.authoring.question import FormEntry
@@ -18,9 +18,11 @@ from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
+from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
 
-EXISTING = {"keep": "keep it", "replace": "replace it"}
+_KEY = TypeAdapter(list[str | int])
+_EXISTING = {"keep": "keep it", "replace": "replace it"}
 
 
 class QuestionId(BaseModel, strict=True):
@@ -56,7 +58,7 @@ def register(page: ui.Page) -> None:
 def _register_writing(page: ui.Page) -> None:
     @page.callback(
         Input("write-card", "n_clicks"),
-        State("new-card-name", "value"),
+        State("name-card", "value"),
         State("replace-card", "data-value"),
         State({"question": ALL}, "value"),
         State({"question": ALL}, "id"),
@@ -73,11 +75,11 @@ def _register_writing(page: ui.Page) -> None:
         """Write the card into the folder and open it."""
         if not clicks:
             return
-        texts = {key: text for key, text in collect_texts(values, ids).items() if text}
-        source = session.write_card(name or "", texts, can_replace=existing == "replace")
-        session.open_card(source)
-        ui.notify_topic(ui.Topic.LOG)
-        ui.notify_opened_log(f"{source.name} is written and open", session.work.require_open_log())
+        typed = collect_texts(values, [one.question for one in ids])
+        texts = {key: text for key, text in typed.items() if text}
+        open_written(
+            session, session.write_card(name or "", texts, can_replace=existing == "replace")
+        )
 
 
 def _register_fields(page: ui.Page) -> None:
@@ -97,7 +99,7 @@ def _register_fields(page: ui.Page) -> None:
         changed = [one.get("question") for one in ctx.triggered_prop_ids.values() if one]
         # Only changed fields: others may be older than the texts that the server has.
         rows = [k for k, one in enumerate(ids) if one.question in changed]
-        texts = collect_texts([values[k] for k in rows], [ids[k] for k in rows])
+        texts = collect_texts([values[k] for k in rows], [ids[k].question for k in rows])
         kept = [no_update] * len(ids)
         if form is None or not texts:
             return no_update, no_update, kept, kept
@@ -114,18 +116,24 @@ def _register_fields(page: ui.Page) -> None:
         return [] if session.form is None else build_form(session.form)
 
 
-def collect_texts(values: Sequence[str | None], ids: Sequence[QuestionId]) -> dict[Key, str]:
-    """Return the texts by key. Raises RefusedError for an id that is no key."""
-    found: dict[Key, str] = {}
-    for value, one in zip(values, ids, strict=True):
-        try:
-            key = json.loads(one.question)
-        except (ValueError, RecursionError):
-            key = None
-        if not isinstance(key, list) or not all(isinstance(part, str) for part in key):
-            raise RefusedError("the request names no question of the form", "load the page again")
-        found[tuple(key)] = value or ""
-    return found
+def open_written(session: Session, source: Source) -> None:
+    """Open a card that was written into the folder."""
+    session.open_card(source)
+    ui.notify_topic(ui.Topic.LOG)
+    ui.notify_opened_log(f"{source.name} is written and open", session.work.require_open_log())
+
+
+def collect_texts(values: Sequence[str | None], ids: Sequence[str]) -> dict[Any, str]:
+    """Return the texts by the key of the field. Raises RefusedError for an id that is no key."""
+    try:
+        return {
+            tuple(_KEY.validate_json(one, strict=True)): value or ""
+            for value, one in zip(values, ids, strict=True)
+        }
+    except ValidationError:
+        raise RefusedError(
+            "the request names no field of the card", "load the page again"
+        ) from None
 
 
 def build_form(form: CardForm) -> list[Component]:
@@ -133,15 +141,17 @@ def build_form(form: CardForm) -> list[Component]:
     return [
         html.Div(_build_fields(form), id="form-fields"),
         html.P(_describe_state(form), id="form-state", className="hint"),
-        ui.make_row(
-            html.Div(
-                ui.make_field("new-card-name", "File name", type="text", value=form.file_name),
-                className="wide",
-            ),
-            ui.make_choice("replace-card", "If the file exists", EXISTING, "keep"),
-            ui.make_button("Write and open the card", "write-card", main=True),
-        ),
+        build_writing("card", "File name", form.file_name, "Write and open the card"),
     ]
+
+
+def build_writing(id: str, label: str, name: str, action: str) -> Component:
+    """Build name, choice and button that write a file; their ids end in `id`."""
+    return ui.make_row(
+        html.Div(ui.make_field(f"name-{id}", label, type="text", value=name), className="wide"),
+        ui.make_choice(f"replace-{id}", "If the file exists", _EXISTING, "keep"),
+        ui.make_button(action, f"write-{id}", main=True),
+    )
 
 
 def _describe_state(form: CardForm) -> str:

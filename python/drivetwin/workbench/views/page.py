@@ -174,8 +174,7 @@ def _register_entry(app: Dash, sessions: Sessions, start: Start) -> None:
             return no_update
         fresh = sessions.create()
         if start.log is not None:
-            with sessions.use(fresh) as session:
-                _open_first(session, start)
+            _open_first(sessions.get(fresh), start)
         return fresh
 
 

@@ -137,8 +137,7 @@ class Page:
         def register(callback: Callable[..., R]) -> Callable[..., R]:
             def act(*values: Any) -> R:
                 *given, key = values
-                with self.sessions.use(key) as session:
-                    return callback(session, *check_fields(callback, given))
+                return callback(self.sessions.get(key), *check_fields(callback, given))
 
             self.app.callback(
                 *arguments,
