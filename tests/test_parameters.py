@@ -1,13 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Ids of parameters: what is declared, and the number of a log in one."""
+"""Contract of every declared parameter, and the number of a log in an id."""
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.verdict import get_experiment
-from drivetwin.parameters import SPECS, get_parameter_spec, split_log_number
+from drivetwin.parameters import (
+    BUS_SPECS,
+    SPECS,
+    ParameterSpec,
+    get_parameter_spec,
+    split_log_number,
+)
 
 
 @pytest.mark.parametrize(
@@ -26,8 +35,27 @@ def test_the_number_of_a_log_is_taken_off(name: str, plain: str, number: int) ->
     assert get_parameter_spec(name).stem == get_parameter_spec(plain).stem
 
 
-def test_every_parameter_has_an_experiment_that_narrows_it() -> None:
-    assert all(get_experiment(stem).endswith(".") for stem in SPECS)
+def _make_id(spec: ParameterSpec) -> str:
+    """Return an id of the parameter, with the suffix that it declares."""
+    separator = {"": "", "gear": "_2", "element": ".B3", "channel": ".wheel_speed", "log": ".2"}
+    return spec.stem + separator[spec.suffix]
+
+
+@pytest.mark.parametrize("spec", [*SPECS.values(), *BUS_SPECS.values()], ids=lambda one: one.stem)
+def test_a_parameter_is_declared_whole(spec: ParameterSpec) -> None:
+    name = _make_id(spec)
+    assert get_parameter_spec(name) is spec
+    assert split_log_number(name) == ((spec.stem, 2) if spec.suffix == "log" else (name, 0))
+    over_eta = get_parameter_spec(f"{name}_over_eta")
+    assert (over_eta.unit, over_eta.symbol) == (spec.unit, f"{spec.symbol}/η")
+    assert math.isfinite(spec.lower)
+    assert spec.lower < spec.upper < math.inf
+    assert spec.name
+    assert not spec.name.lower().startswith(("the ", "a ", "an "))
+    assert spec.meaning
+    assert not set("*^") & set(format_with_unit(1.0, spec.unit))
+    if spec.stem in SPECS:
+        assert get_experiment(name).endswith(".")
 
 
 @pytest.mark.parametrize("name", ["eta.1", "k_o.2", "nonsense"])

@@ -77,11 +77,6 @@ def test_a_pressure_of_another_clutch_is_refused() -> None:
         identify_actuator([other])
 
 
-def test_a_design_value_has_no_spread() -> None:
-    model = make_actuator(np.random.default_rng(1)).model
-    assert not IdentifiedActuator.from_design(model).std.any()
-
-
 def test_a_delay_lengthens_the_dead_time_within_its_bounds() -> None:
     model = ActuatorModel(dead_time=0.02, rising_lag=0.02, falling_lag=0.03)
     one = IdentifiedActuator.from_design(model)

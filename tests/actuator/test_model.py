@@ -194,7 +194,3 @@ def test_values_outside_their_bounds_are_refused(name: str) -> None:
         replace(MODEL, **{name: QUANTITIES[name].upper * 1.01})
     with pytest.raises(InputError, match=QUANTITIES[name].label):
         replace(MODEL, **{name: QUANTITIES[name].lower - 0.01})
-
-
-def test_values_round_trip() -> None:
-    assert ActuatorModel.from_values(MODEL.values) == MODEL

@@ -17,15 +17,10 @@ from drivetwin.estimation.analysis.experiment_design import (
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import compute_variance_inflation
-from drivetwin.estimation.likelihood.parametrization import LAW, map_log_names
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import make_log_id
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.suggestion import (
-    NONE_HELPS,
-    ExpectedPrecision,
     Experiment,
-    ExperimentRanking,
 )
 from tests.estimation.asked import by_the_paper, slowed, stepped, still, uncertain_fills
 
@@ -63,29 +58,6 @@ def test_order_is_by_worth_and_least_known_are_told_too() -> None:
         widths = [p.half_width for p in one.prospects]
         assert widths == sorted(widths)
         assert widths[0] < one.half_width
-
-
-def _suggestion(now: float, *widths: float) -> ExperimentRanking:
-    prospects = tuple(
-        ExpectedPrecision(each, 1, width, Verdict.IDENTIFIED)
-        for each, width in zip(Experiment, widths, strict=False)
-    )
-    return ExperimentRanking("P0.B2", Verdict.IDENTIFIED, now, prospects)
-
-
-def test_an_experiment_that_hardly_narrows_is_not_named() -> None:
-    useless = _suggestion(7428.0, 7423.0, 7424.0)
-    assert useless.best is None
-    assert useless.text == NONE_HELPS
-    useful = _suggestion(7428.0, 7423.0, 5000.0)
-    assert useful.best is useful.prospects[1]
-    assert useful.text == Experiment.THROTTLE_STEPS
-
-
-def test_of_an_open_parameter_an_experiment_that_leaves_it_open_is_not_named() -> None:
-    width = ExpectedPrecision(Experiment.AGAIN, 4, 0.04, Verdict.NOT_IDENTIFIABLE)
-    one = ExperimentRanking("te_delay", Verdict.NOT_IDENTIFIABLE, np.inf, (width,))
-    assert one.text == NONE_HELPS
 
 
 def _followed_by_another_shift(found: Identification) -> Identification:
@@ -175,33 +147,3 @@ def test_an_experiment_has_the_slow_errors_of_the_log() -> None:
         )
     assert power[1] > 2.0 * power[0]
     assert half[1] / half[0] == pytest.approx(np.sqrt(power[1] / power[0]), rel=1e-6)
-
-
-def _numbered(found: Identification, log: int) -> Identification:
-    """The identification as if its log were number `log` of several."""
-    fit, signals = get_likelihood_fit(found)
-    own = map_log_names(log)
-    point = ParameterVector(
-        tuple(own.get(name, name) for name in fit.point.names), fit.point.values
-    )
-    terms = tuple(
-        replace(one, structure=replace(one.structure, log=log)) for one in fit.problem.terms
-    )
-    problem = replace(fit.problem, terms=terms)
-    evidence = replace(
-        found.evidence,
-        likelihood=replace(fit, problem=problem, point=point, mean=point),
-        signals=tuple(replace(one, log=log) for one in signals),
-    )
-    estimates = [replace(one, id=make_log_id(one.id, log)) for one in found.estimates.values()]
-    return replace(found, evidence=evidence, estimates={one.id: one for one in estimates})
-
-
-def test_of_several_logs_the_age_of_a_still_torque_is_promised_no_more_than_of_one() -> None:
-    alone, one_of_two = compute_rankings(still())[0], compute_rankings(_numbered(still(), 2))[0]
-    assert one_of_two.parameter == "te_delay.2"
-    assert [(p.experiment, p.verdict) for p in one_of_two.prospects] == [
-        (p.experiment, p.verdict) for p in alone.prospects
-    ]
-    widths = [p.half_width for p in one_of_two.prospects]
-    assert widths == pytest.approx([p.half_width for p in alone.prospects], rel=1e-6)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,18 +11,16 @@ import pytest
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.data import prepare as preparation
-from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.prepare import (
     collect_tolerances,
     prepare,
     prepare_shift,
 )
-from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, drop_unbalanced
+from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog, ShiftSignals
 from drivetwin.estimation.linear.estimates import apply_sensor_error
-from drivetwin.shifts.coverage import AFTER, BEFORE
 from drivetwin.shifts.detect import FoundShifts
-from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -64,24 +61,6 @@ def drive() -> ShiftLog:
 
 def signals_of(log: ShiftLog, one: Shift) -> ShiftSignals:
     return prepare_shift(log, CARD, one).signals
-
-
-def test_of_a_long_log_the_estimators_see_what_is_near_the_shift() -> None:
-    log, one = drive(), replace(shift(100.0), before=(95.0, 100.0), after=(100.6, 104.0))
-    signals = signals_of(log, one)
-    seen = [
-        signals.engine_torque,
-        signals.output_torque,
-        signals.engine_speed,
-        signals.output_speed,
-        signals.pressures["B2"],
-    ]
-    for signal in seen:
-        assert signal.time[0] == pytest.approx(95.0 - SHIFT_SELECTION.kept_beside, abs=0.011)
-        assert signal.time[-1] == pytest.approx(104.0 + SHIFT_SELECTION.kept_beside, abs=0.011)
-    assert signals.engine_torque.sigma == prepare_signal(log["engine_torque"]).sigma
-    whole = signals_of(log, replace(one, before=(0.0, 100.0), after=(100.6, 200.0)))
-    assert whole.engine_torque.time.size == log["engine_torque"].time.size
 
 
 def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_speed() -> None:
@@ -132,18 +111,6 @@ def test_what_is_older_has_the_values_of_before() -> None:
 
 def _prepare(log: ShiftLog, card: VehicleCard) -> PreparedLog:
     return prepare(log, card, FoundShifts((shift(80.0), shift(150.0)), ()))
-
-
-def test_what_is_fitted_is_near_the_shifts_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    def chosen(
-        _channels: object, _i_f: float, shifts: Sequence[Shift]
-    ) -> tuple[tuple[Shift, ...], tuple[RejectedShift, ...]]:
-        return tuple(shifts[1:]), (RejectedShift(shifts[0].inertia_phase, "left out"),)
-
-    monkeypatch.setattr(preparation, "select_shifts", chosen)
-    (one,) = _prepare(drive(), CARD).signals
-    assert one.shift.before == (150.0 - BEFORE, 150.0)
-    assert one.shift.after == (150.6, 150.6 + AFTER)
 
 
 def test_a_shift_in_overrun_does_not_stop_the_others(monkeypatch: pytest.MonkeyPatch) -> None:

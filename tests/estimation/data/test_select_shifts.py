@@ -134,9 +134,3 @@ def test_no_more_shifts_than_tell_something_new() -> None:
     assert list(kept) == sorted(kept, key=lambda one: one.lockup_time)
     assert len(refused) == len(usual) + 1 - SHIFT_SELECTION.max_shifts
     assert all("not needed" in one.reason for one in refused)
-
-
-def test_without_an_output_torque_the_first_of_each_kind_are_taken() -> None:
-    usual = tuple(shift(50.0 + 5.0 * k) for k in range(SHIFT_SELECTION.max_shifts + 1))
-    kept, _ = choose(None, usual)
-    assert kept == usual[: SHIFT_SELECTION.max_shifts]

@@ -17,11 +17,10 @@ from drivetwin.estimation.likelihood.budget import (
 )
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import find_staged_start, fit_local, refine
+from drivetwin.estimation.likelihood.optimize.multistart import find_staged_start
 from drivetwin.estimation.likelihood.selection import select_model as selection_module
 from drivetwin.estimation.likelihood.selection.select_model import select_model
-from drivetwin.estimation.linear.load_balance import AERO
-from tests.estimation.likelihood.fixtures import bench, fitted, problem, truth_of
+from tests.estimation.likelihood.fixtures import bench, problem, truth_of
 
 
 def _chosen(seed: int = 0) -> LikelihoodFit:
@@ -60,27 +59,6 @@ def test_a_search_that_has_no_work_to_do_is_refused(monkeypatch: pytest.MonkeyPa
         _chosen()
 
 
-def test_what_a_wider_model_found_stands_where_there_is_no_work_left(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(
-        selection_module,
-        "SELECTION",
-        replace(selection_module.SELECTION, max_restricted_work=2.0 * EXPANSION),
-    )
-    # In this log's noise the load grows a little; where it ends at zero there is nothing to search.
-    assert _chosen(seed=1).point[AERO] > 0.0
-
-
-def test_a_fit_that_is_known_outlives_the_work_of_checking_it() -> None:
-    made, found = bench(), fitted()
-    posed, start = problem(made)
-    with limit_evaluations(EXPANSION):
-        assert refine(found, posed, start, [made.signals.shift]) is found
-    again = refine(found, posed, start, [made.signals.shift])
-    assert again.chi2 == pytest.approx(found.chi2, abs=1e-3)
-
-
 def test_a_stage_far_from_the_measurement_is_the_last() -> None:
     made = bench()
     posed, start = problem(made)
@@ -94,9 +72,3 @@ def test_a_stage_far_from_the_measurement_is_the_last() -> None:
     with limit_evaluations(24.0 * EXPANSION + 100.0 * RUN):
         wrong = type(posed)(posed.terms, held, posed.lower, posed.upper)
         assert find_staged_start(wrong, heavy, [made.signals.shift]) is None
-
-
-def test_a_search_above_what_is_asked_for_ends_soon() -> None:
-    posed, start = problem(bench(), off=0.02)
-    with limit_evaluations(12.0 * EXPANSION):
-        assert fit_local(posed, start, most=0.5) is None

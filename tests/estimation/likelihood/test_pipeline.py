@@ -5,16 +5,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import DesignData
 from drivetwin.estimation.likelihood.pipeline import LINEAR_START, estimate_likelihood
 from drivetwin.estimation.linear.estimates import assess_shifts
-from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
+from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.findings import Code
 from drivetwin.simulation.dual_clutch import RoadLoad
-from tests.support.bench import Bench, Knowledge, record_bench
+from tests.support.bench import Knowledge, record_bench
 
 DESIGN = DesignData("paper", 5.0, (3.0, 9.0), (1000.0, 9000.0))
 GROWTH = 40.0
@@ -37,43 +35,3 @@ def test_a_growing_load_is_told_and_not_that_the_linear_method_knows_none() -> N
     assert J.value is not None
     assert abs(linear_J.value - J.value) > LINEAR_START.disagreement * linear_J.std_noise
     assert Code.METHODS_DIFFER not in [one.code for one in told.findings]
-
-
-@pytest.mark.parametrize("factor", [1.0, 1e3, -1.0])
-def test_a_vehicle_that_cannot_be_is_no_start(
-    factor: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made = record_bench(load_scenario("throttle_steps"), 0, Knowledge())
-    found = identify_shift(made.signals, made.driveline, 5.0)
-    values = found.values.copy()
-    values[found.ids.index("J_vehicle")] *= factor
-    guess = _started_from(made, replace(found, values=values), monkeypatch)
-    told = dict(zip(found.ids, found.values, strict=True))
-    low, high = DESIGN.J_vehicle_range
-    assert guess["eta"] == told["eta"]
-    assert (guess["J_vehicle"] == told["J_vehicle"]) == (factor == 1.0)
-    assert low <= guess["J_vehicle"] <= high
-    assert 0.2 < guess["k_o"] / made.truth["k_o"] < 5.0
-
-
-class _Seen(Exception):
-    """The start values are known."""
-
-
-def _started_from(
-    made: Bench, shift: IntegralShift, monkeypatch: pytest.MonkeyPatch
-) -> dict[str, float]:
-    """The start values of the likelihood after what the linear method told of a shift."""
-    seen: list[dict[str, float]] = []
-
-    def caught(*given: object) -> None:
-        assert isinstance(given[3], dict)
-        seen.append(given[3])
-        raise _Seen
-
-    monkeypatch.setattr("drivetwin.estimation.likelihood.pipeline.select_model", caught)
-    signals, drivelines = [made.signals], [made.driveline]
-    linear = assess_shifts([shift], signals, drivelines, {})
-    with pytest.raises(_Seen):
-        estimate_likelihood(signals, drivelines, (linear, [shift]), DESIGN)
-    return seen[0]

@@ -10,26 +10,13 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
-from drivetwin.estimation.likelihood.priors import BOUNDS, build_problem
+from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.variable import Variable
 from drivetwin.vehicle.spec import PriorValue
 from tests.estimation.likelihood.fixtures import bench, fitted, problem, truth_of
-
-
-def test_output_inertia_is_sought_about_its_design_value() -> None:
-    made = bench()
-    assert made.driveline.J_out is not None
-    posed, start = problem(made)
-    place = start.names.index("J_out")
-    assert posed.lower[place] == pytest.approx(0.1 * made.driveline.J_out.value)
-    assert posed.upper[place] == pytest.approx(10.0 * made.driveline.J_out.value)
-    unknown = replace(made, driveline=replace(made.driveline, J_out=None))
-    free, _ = problem(unknown)
-    assert (free.lower[place], free.upper[place]) == BOUNDS["J_out"]
-
 
 STEP = 1e-6
 

@@ -13,7 +13,6 @@ from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
     check_excitation,
-    collect_shift_labels,
 )
 from drivetwin.findings import render
 from drivetwin.vehicle.spec import PriorValue
@@ -24,20 +23,6 @@ def test_a_gear_with_still_torque_is_named() -> None:
     notes = check_excitation(still().evidence.signals)
     assert set(notes) == {"eta", "J_prime_2", "J_prime_3"}
     assert notes["eta"].names["gear"] == "2"
-
-
-def test_another_shift_from_that_gear_with_steps_tells_it() -> None:
-    both = (*still().evidence.signals, *stepped().evidence.signals)
-    assert check_excitation(both) == {}
-
-
-def test_the_same_shift_twice_is_told_apart_by_its_lock_up() -> None:
-    (first,) = stepped().evidence.signals
-    later = replace(first, shift=replace(first.shift, lockup_time=12.5))
-    assert collect_shift_labels([first]) == ["shift 2-3"]
-    assert collect_shift_labels([first, later])[1] == "shift 2-3 at 12.50 s"
-    apart = [replace(first, log=1), replace(later, log=2)]
-    assert collect_shift_labels(apart) == ["log 1, shift 2-3", "log 2, shift 2-3"]
 
 
 def _with_J_out(value: float, known: PriorValue | None, sensors: float = 0.0) -> EstimateSet:
@@ -94,26 +79,6 @@ def test_where_a_regression_leaves_far_more_than_noise_nothing_of_it_is_identifi
         assert told[touched].verdict is verdict
         assert told[spared].verdict is Verdict.IDENTIFIED
     assert "11 times the noise power" in told[touched].reason
-
-
-@pytest.mark.parametrize(("count", "named"), [(1, "shift 2-3"), (4, "4 shifts")])
-def test_what_many_shifts_have_in_common_is_told_once(count: int, named: str) -> None:
-    found = stepped()
-    (shift,), (signals,) = found.evidence.integral, found.evidence.signals
-    driveline = get_likelihood_fit(found)[0].problem.terms[0].structure.driveline
-    shifts, every = [], []
-    for i in range(count):
-        fit = replace(shift.load.fit, chi2=2.0 + i)
-        load = replace(shift.load, fit=fit, speed_trend=10.0 + i)
-        shifts.append(replace(shift, load=load))
-        every.append(replace(signals, shift=replace(signals.shift, lockup_time=10.0 + i)))
-    told = render(assess_shifts(shifts, every, [driveline] * count, {}).findings)
-    noisy = [text for text in told if "Residual power" in text]
-    trends = [text for text in told if "changes with speed" in text]
-    power, trend = ("2.0", "10.0") if count == 1 else ("2.0 to 5.0", "10.0 to 13.0")
-    assert len(noisy) == len(trends) == 1
-    assert noisy[0].startswith(f"{named}: Residual power of the load is {power} times")
-    assert trends[0].startswith(f"{named}: Load torque changes with speed (t = {trend})")
 
 
 def test_shifts_that_add_nothing_to_the_fill_pressure_leave_it_the_cards() -> None:

@@ -11,10 +11,7 @@ import pytest
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.linear.estimates import assess_shifts
 from drivetwin.estimation.linear.load_balance import (
-    compute_mean_speed,
-    estimate_momentum_load,
     find_growth_reference,
-    select_load_spans,
 )
 from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.findings import Code
@@ -42,19 +39,6 @@ def signals(stepped: Run) -> ShiftSignals:
 
 def test_a_constant_load_does_not_grow(signals: ShiftSignals) -> None:
     assert find_growth_reference([signals], Truth().i_f) is None
-
-
-def test_a_load_that_grows_is_told_from_inertia(signals: ShiftSignals) -> None:
-    grown, i_f, truth = _grown(signals), Truth().i_f, Truth()
-    holds_at = find_growth_reference([grown], i_f)
-    assert holds_at == compute_mean_speed([grown], i_f)
-    found = estimate_momentum_load(grown, i_f, select_load_spans(grown), holds_at)
-    theta, std = found.fit.theta, found.fit.std
-    assert np.all(np.abs(theta - [truth.load, truth.J_vehicle, AERO]) < 4.0 * std)
-    assert std[1] < 0.02 * truth.J_vehicle
-    constant = estimate_momentum_load(grown, i_f, select_load_spans(grown))
-    assert constant.fit.chi2 > 10.0 * found.fit.chi2
-    assert abs(constant.speed_trend) > 20.0 > 5.0 > abs(found.speed_trend)
 
 
 def test_the_conclusions_have_the_law_and_an_inertia_that_holds(signals: ShiftSignals) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import estimate_quantization_error, estimate_white_noise
+from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.segments import MOMENTUM, find_off_going_release
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
 from drivetwin.estimation.linear.friction_points import evaluate_fitted_stribeck
@@ -59,30 +59,11 @@ def test_noise_free_log_returns_every_parameter(stepped: Run) -> None:
     compare(found, Truth(), 5e-4, 5e-4)
 
 
-def test_the_ring_is_fitted_from_where_lockup_is_sure(stepped: Run) -> None:
-    signals = stepped.signals()
-    ring = identify_shift(signals, Truth().driveline(), 12.0).ring
-    assert ring is not None
-    assert 0.01 <= ring.time[0] - signals.shift.lockup_time < 0.02
-
-
 def test_the_shift_alone_carries_eta_and_inertia(constant: Run) -> None:
     found = identify_shift(constant.signals(), Truth().driveline(), 12.0)
     compare(found, Truth(), 5e-4, 5e-4)
     assert "te_delay" not in found.ids
     assert "delay" in found.refusals["te_delay"]
-
-
-@pytest.mark.parametrize("P0", [PriorValue(8e4, 1e5), PriorValue(0.0, 1e5), PriorValue(0.0)])
-def test_an_off_going_element_of_unknown_or_no_fill_pressure_still_leaves_an_inertia_phase(
-    constant: Run, P0: PriorValue
-) -> None:
-    signals, driveline = constant.signals(), Truth().driveline()
-    unknown = replace(driveline, offgoing=replace(driveline.offgoing, P0=P0))
-    settings = MOMENTUM
-    known, free = (find_off_going_release(signals, one, settings) for one in (driveline, unknown))
-    assert known < free < known + 0.05
-    compare(identify_shift(signals, unknown, 12.0), Truth(), 5e-4, 5e-4)
 
 
 def test_an_off_going_element_that_lingers_about_its_fill_pressure_is_never_free(
@@ -153,32 +134,6 @@ def test_intervals_cover_and_values_are_unbiased(stepped: Run, draws: int) -> No
     for inside in np.count_nonzero(np.abs(scores) < 1.96, axis=1):
         assert_covers(inside, draws)
     assert np.max(np.abs(scores.mean(axis=1))) < 3.5 / np.sqrt(draws)
-
-
-@pytest.mark.parametrize("ring", [True, False])
-def test_what_was_known_beforehand_is_told_with_the_values(stepped: Run, ring: bool) -> None:
-    plain, drum = Truth().driveline(J_out_std=0.09, P0_std=5e3), PriorValue(0.05, 0.03)
-    couplings = {n: replace(c, drum=drum) for n, c in plain.couplings.items()}
-    told = replace(plain, couplings=couplings, offgoing=couplings["B2"], oncoming=couplings["B3"])
-    signals = stepped.noisy(np.random.default_rng(0), age=0.012)
-    if not ring:
-        shift = signals.shift
-        after = (shift.after[0], shift.lockup_time + 0.1)
-        signals = replace(signals, shift=replace(shift, after=after))
-    found = identify_shift(signals, told, 12.0)
-    assert ("shaft" in found.refusals) != ring
-    design = {"J_out": PriorValue(0.9, 0.09), "P0.B3": PriorValue(8e4, 5e3)}
-    rounding = estimate_quantization_error(signals.engine_torque, signals.torque_resolution)
-    torque = {
-        "te_delay": MOMENTUM.delay_prior,
-        "te_rounding": PriorValue(0.0, rounding),
-    }
-    assert found.priors == {**design, "drum.B2": drum, "drum.B3": drum, **torque}
-    stds = dict(zip(found.ids, np.sqrt(np.diag(found.covariance)), strict=True))
-    for name, prior in found.priors.items():
-        assert stds[name] <= prior.std * (1.0 + 1e-9), name
-    place = found.ids.index("drum.B3")
-    assert found.values[place] == pytest.approx(found.momentum.get_value("drum.B3"))
 
 
 def reference_signals(name: str, filled: float) -> ShiftSignals:

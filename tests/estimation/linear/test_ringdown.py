@@ -13,7 +13,6 @@ from drivetwin.estimation.linear.ringdown import (
     compute_forced_response,
     compute_shaft_parameters,
     fit_ringdown,
-    remove_jitter,
 )
 from drivetwin.estimation.paper.pipeline import estimate_paper_ringdown
 from tests.support.arrays import FloatArray
@@ -148,16 +147,6 @@ def test_noise_alone_is_refused() -> None:
 def test_too_short_a_stretch_is_refused() -> None:
     with pytest.raises(IdentificationError, match=r"less than 0\.15 s"):
         fit_ringdown(MeasuredSignal(TIME, ring(), 1.0), 1.85, 2.0, None)
-
-
-def test_quiet_straightens_jitter_and_keeps_steps() -> None:
-    time = np.arange(0.0, 2.0, 0.01)
-    level = np.where(time < 1.0, 1000.0, 1400.0)
-    noisy = level + 5.0 * np.random.default_rng(4).standard_normal(time.size)
-    calm = remove_jitter(MeasuredSignal(time, noisy, 5.0)).values
-    away = np.abs(time - 1.0) > 0.1
-    assert np.max(np.abs(calm - level)[away]) < 4.0
-    assert np.max(np.abs(calm - level)) < 25.0
 
 
 def test_stiffness_and_damping_invert_the_two_mass_formulas() -> None:

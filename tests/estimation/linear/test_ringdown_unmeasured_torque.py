@@ -47,11 +47,6 @@ def told(torque: float, seeds: int = 20) -> tuple[FloatArray, FloatArray]:
     return np.sqrt(noise), np.sqrt([float(np.mean(acting)) for _, acting in found])
 
 
-def test_a_straight_torque_is_the_sum_of_its_hats() -> None:
-    assert pytest.approx(1.0 + 2.0 * TIME) == compute_hat_weights(TIME, KNOTS) @ (1.0 + 2.0 * KNOTS)
-    assert np.diff(KNOTS)[0] == pytest.approx(2.0 * np.pi / OMEGA / 8.0, rel=0.05)
-
-
 def test_noise_and_torque_are_told_apart() -> None:
     noise, torque = told(60.0)
     assert np.mean(noise) == pytest.approx(SIGMA, rel=0.02)

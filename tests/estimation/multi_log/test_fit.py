@@ -17,14 +17,11 @@ from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.parametrization import LOG_SPECIFIC
 from drivetwin.estimation.multi_log.consistency import find_shared
 from drivetwin.estimation.multi_log.fit import (
-    compute_start,
     extract_log,
-    find_largest_differences,
     merge_tolerances,
 )
 from drivetwin.parameters import split_log_number
 from drivetwin.pipeline import identify, identify_jointly
-from tests.estimation.asked import still
 from tests.estimation.multi_log.fixtures import (
     LOADS,
     card,
@@ -106,26 +103,6 @@ def test_each_log_has_its_own_and_nothing_else() -> None:
     assert {f"log{k}.{name}" for k in (1, 2) for name in LOG_SPECIFIC[:2]} <= set(names)
 
 
-def test_what_is_told_of_one_log_has_plain_ids() -> None:
-    found = together().found
-    second = extract_log(found, _several().logs[1])
-    assert second.estimates["Tv_over_if"].value == found.estimates["Tv_over_if.2"].value
-    assert second.estimates["Tv_over_if"].id == "Tv_over_if"
-    assert set(second.estimates) == set(_several().logs[1].alone)
-    assert second.correlation is not None
-    assert second.correlation.shape == 2 * (len(second.correlation_ids),)
-    assert len(second.shifts) == 1
-
-
-def test_the_start_is_the_mean_by_information() -> None:
-    found = still()
-    fit, _ = get_likelihood_fit(found)
-    start = compute_start([found, found])
-    for name, value in zip(fit.mean.names, fit.mean.values, strict=True):
-        if not name.startswith("start") and name not in LOG_SPECIFIC:
-            assert start[name] == pytest.approx(value, rel=1e-4, abs=1e-7), name
-
-
 def test_the_same_recording_twice_is_refused() -> None:
     one = pair()[0]
     again = replace(one.log, source="copy.mf4", sha256="another")
@@ -145,10 +122,6 @@ def test_logs_of_different_vehicles_are_refused_with_what_differs() -> None:
     heavy = source(scenario(payload=1.25), 25)
     with pytest.raises(IdentificationError, match="J_vehicle"):
         identify_jointly([pair()[0].log, heavy.log], card(), [pair()[0].shifts, heavy.shifts])
-
-
-def test_logs_that_agree_have_nothing_that_differs() -> None:
-    assert find_largest_differences([still(), still()]) == []
 
 
 def test_a_disagreement_widens_and_weakens_what_it_concerns() -> None:

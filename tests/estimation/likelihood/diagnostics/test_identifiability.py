@@ -5,20 +5,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from drivetwin.estimation.likelihood.diagnostics.identifiability import find_at_bounds
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
-from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
-    compute_jacobian,
-    compute_parameters,
-)
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.findings import Code
-from tests.estimation.likelihood.fixtures import bench, fitted, problem
+from tests.estimation.likelihood.fixtures import bench, problem
 
 SHORT = 0.003
 """Distance from the age that the log has to the limit of the search [s]."""
@@ -39,10 +33,3 @@ def test_an_age_at_the_limit_of_the_search_is_not_identified(side: float, word: 
     assert age.verdict is Verdict.WEAK
     assert f"the bound of the search; the log indicates a {word} value" in age.reason
     assert Code.AT_BOUND in [one.code for one in told.findings if one.subject == "te_delay"]
-
-
-def test_within_the_limits_nothing_is_said() -> None:
-    fit, signals = fitted(), [bench().signals]
-    std = np.sqrt(np.diag(fit.covariance))
-    ids = tuple(compute_parameters(fit.problem, fit.mean, signals))
-    assert find_at_bounds(fit, ids, compute_jacobian(fit.problem, fit.mean, std, signals)) == []

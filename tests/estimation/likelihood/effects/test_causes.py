@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.estimation.likelihood.effects.causes import find_cause, report_cause
+from drivetwin.estimation.likelihood.effects.causes import find_cause, report_cause, widen_by_rivals
 from drivetwin.estimation.likelihood.effects.correction import Correction, keep_fit
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.fit import PlantEvidence
-from drivetwin.estimation.result.cause import Group
+from drivetwin.estimation.result.cause import Cause, Group
 from drivetwin.findings import Code
 from drivetwin.vehicle.effects import EffectId
 from tests.estimation.likelihood.fixtures import fitted
+from tests.support.arrays import FloatArray
 
 LATE = Group(EffectId.PRESSURE_DELAY, "B3")
 
@@ -71,3 +72,33 @@ def test_a_part_of_the_plant_at_a_bound_resembles_only() -> None:
     bound = replace(plant, problem=replace(fit.problem, lower=lower))
     found = [find_cause(kept, one) for one in (plant, bound)]
     assert [one is not None and one.is_explained for one in found] == [True, False]
+
+
+HEAT = Group(EffectId.FRICTION_HEAT, "B3")
+MOVE = 3.0
+
+
+def _corrected_by_two(lead: float) -> tuple[Correction, Cause, FloatArray]:
+    """Return a correction with two causes, `lead` apart, that move the first unknown by ±3."""
+    kept = keep_fit(fitted())
+    unit = np.zeros(kept.mean.values.size)
+    unit[0] = MOVE
+    one = np.ones(1)
+    evidence = {
+        HEAT: GroupEvidence(20.0 + lead, one, one, (0,), one, unit),
+        LATE: GroupEvidence(20.0, one, one, (1,), one, -unit),
+    }
+    cause = Cause(HEAT, 20.0 + lead, 0.03, 0.001, (), 20.0)
+    return replace(kept, evidence=evidence), cause, unit
+
+
+def test_two_equal_causes_widen_by_what_each_would_move() -> None:
+    kept, cause, unit = _corrected_by_two(0.0)
+    wide = widen_by_rivals(kept, fitted(), cause)
+    assert wide.covariance - kept.covariance == pytest.approx(np.outer(unit, unit), abs=1e-9)
+
+
+def test_a_cause_that_leads_changes_nothing() -> None:
+    kept, cause, _ = _corrected_by_two(6.0)
+    assert widen_by_rivals(kept, fitted(), cause) is kept
+    assert widen_by_rivals(kept, fitted(), None) is kept

@@ -15,7 +15,6 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.optimize import multistart as fitting
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
-    NoConvergence,
     fit_local,
     fit_lower_gear_only,
     fit_multistart,
@@ -88,22 +87,6 @@ def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
     wrong = replace(term, structure=replace(term.structure, fixed=fixed))
     with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
         fit_multistart(replace(posed, terms=(wrong,)), start, [made.signals.shift])
-
-
-def test_two_starts_that_lead_nowhere_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = bench()
-    posed, start = problem(made)
-    seen = []
-    monkeypatch.setattr(fitting, "find_staged_start", lambda *given: seen.append(given))
-    heavy = [5.0 if name == "J_e" else 1.0 for name in start.names]
-    far = start.replace_values(start.values * np.array(heavy))
-    assert posed.cost(far) > MULTI_START.direct_chi2 * posed.size
-    with pytest.raises(NoConvergence):
-        fit_multistart(posed, far, [made.signals.shift])
-    assert len(seen) == MULTI_START.min_starts
-    with pytest.raises(IdentificationError) as one:
-        fit_multistart(posed, far, [made.signals.shift], restarts=MULTI_START.shaft_factors[:1])
-    assert not isinstance(one.value, NoConvergence)
 
 
 def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:

@@ -18,7 +18,7 @@ from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection import candidates
 from drivetwin.findings import render
 from drivetwin.simulation.dual_clutch import LossLaw
-from tests.estimation.likelihood.fixtures import bench, fitted, truth_of
+from tests.estimation.likelihood.fixtures import truth_of
 from tests.support.bench import Bench, Knowledge, record_bench
 from tests.support.shared_results import shared
 
@@ -64,15 +64,3 @@ def test_a_wrong_law_is_told_with_what_the_right_one_gives(true: LossLaw) -> Non
 @pytest.mark.parametrize("true", LAWS)
 def test_of_a_right_law_nothing_is_said(true: LossLaw) -> None:
     assert _said(_made(true), _fit(true, true)) == []
-
-
-def test_nothing_is_said_where_the_laws_are_the_same() -> None:
-    assert _said(bench(), fitted()) == []
-
-
-def test_a_log_that_tells_neither_law_from_the_other_says_so(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(candidates, "RULED_OUT", 1e6)
-    (text,) = _said(_made("paper"), _fit("paper", "paper"))
-    assert "does not decide between the laws" in text

@@ -3,25 +3,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.likelihood.effects.columns import EffectPriors, build_columns
-from drivetwin.estimation.likelihood.effects.table import EFFECTS
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.parametrization import PLANTS
 from drivetwin.estimation.likelihood.selection.candidates import try_plants
-from drivetwin.estimation.likelihood.selection.plants import build_plant_priors, extend_problem
-from drivetwin.estimation.result.cause import LEAD, Group
+from drivetwin.estimation.result.cause import LEAD
 from drivetwin.findings import Code
-from drivetwin.vehicle.effects import EffectId, EffectPrior
-from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem
+from drivetwin.vehicle.effects import EffectId
+from tests.estimation.likelihood.fixtures import ROUGH, fitted, problem
 from tests.support.bench import Bench, record_bench
 from tests.support.shared_results import shared
 
@@ -84,32 +80,6 @@ def test_a_log_without_a_mode_keeps_the_dual_clutch_and_widens() -> None:
     added = (found.covariance - plain.covariance) / np.outer(std, std)
     assert np.linalg.eigvalsh(added)[0] > -1e-9
     assert np.max(added) > 0.0
-
-
-def test_a_stated_effect_in_the_plant_has_no_column(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A column beside the part would count the stated size twice.
-
-    The torque of this log keeps its sign, so the effect gets a column that acts on any log.
-    """
-    drag = EFFECTS[EffectId.INPUT_DRAG].build
-    acting = replace(EFFECTS[EffectId.BACKLASH], build=drag)
-    monkeypatch.setitem(EFFECTS, EffectId.BACKLASH, acting)
-    made = fitted()
-    stated = EffectPriors({EffectId.BACKLASH: EffectPrior(0.005, 0.03)})
-    priors = build_plant_priors(EffectId.BACKLASH, stated, bench().driveline)
-    posed, point = extend_problem(made.problem, made.point, EffectId.BACKLASH, priors)
-    plain = build_columns(made.problem, made.point, stated)
-    assert plain is not None
-    assert np.any(plain.known[0])
-    columns = build_columns(posed, point, stated)
-    assert columns is not None
-    assert Group(EffectId.BACKLASH) not in columns.groups
-    assert not np.any(columns.known[0])
-
-
-def test_a_mode_that_is_off_is_not_tried() -> None:
-    _, plain = swinging()
-    assert try_plants(plain, EffectPriors({MODE: EffectPrior(0.0)})) is plain
 
 
 TYRE = EffectId.TYRE_SLIP

@@ -13,7 +13,6 @@ from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.noise.residual_covariance import Whitener
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START, fit_local
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection import sampling_mode as of_signals
@@ -140,43 +139,8 @@ def _without_torque() -> tuple[ShiftObjective, ParameterVector, LikelihoodFit]:
     return posed, start, best
 
 
-def test_a_weighting_with_more_room_that_leaves_less_is_no_better_mode(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    posed, _, best = _without_torque()
-    terms = [
-        replace(term, weighting=Whitener(2.0 * term.record.sigma**2))
-        for term in posed.select_modes(SPEEDS).terms
-    ]
-    roomy = replace(
-        best,
-        problem=replace(posed, terms=tuple(terms)),
-        normal=replace(best.normal, cost=0.5 * best.normal.cost),
-        chi2=0.5 * best.chi2,
-    )
-    monkeypatch.setattr(of_signals, "_promising", lambda *_: frozenset(SPEEDS))
-    monkeypatch.setattr(of_signals, "_nearby", lambda *_: roomy)
-    assert refit_best_mode(posed, best) is best
-
-
 def test_modes_are_compared_by_the_same_samples() -> None:
     assert _posed().select_modes(SPEEDS).size == _posed().size
-
-
-def test_from_far_off_signals_are_taken_as_read() -> None:
-    posed, start, best = _without_torque()
-    way = start.values - best.point.values
-    far = start.replace_values(best.point.values + 0.5 * way)
-    weighted = posed.update_weighting(far)
-    normal = weighted.normal(far)
-    assert normal is not None
-    assert MULTI_START.far_chi2 < normal.cost / posed.size < MULTI_START.direct_chi2
-    assert of_signals._promising(weighted, far, normal)  # wrong: there are samples alone
-    likely, other = select_sampling_mode(
-        posed, far, [record_bench(load_scenario("throttle_steps"), 0, ROUGH).signals.shift]
-    )
-    assert likely.modes == frozenset()
-    assert other.modes == frozenset(SPEEDS)
 
 
 def test_from_far_off_the_lower_gear_determines_modes() -> None:
@@ -244,7 +208,3 @@ def test_slow_samples_stay_samples() -> None:
     posed, known = _at_50_hertz(0.0)
     assert known.problem.modes == frozenset()
     assert refit_slow_outputs(posed, known) is known
-
-
-def test_fast_outputs_of_the_other_mode_are_within_reach_of_the_expansion() -> None:
-    assert refit_slow_outputs(_posed(), _fit(frozenset())) is _fit(frozenset())

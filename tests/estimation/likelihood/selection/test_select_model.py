@@ -17,11 +17,7 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.correction import correct_fit
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
-from drivetwin.estimation.likelihood.optimize.multistart import fit_local
-from drivetwin.estimation.likelihood.selection import candidates
-from drivetwin.estimation.likelihood.selection import select_model as selection_module
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
 from drivetwin.estimation.likelihood.selection.select_model import select_model
 from drivetwin.estimation.linear.load_balance import AERO
@@ -67,43 +63,6 @@ def test_a_growing_load_is_found_and_told_at_the_mean_speed() -> None:
     assert _deviation(fit, AERO, GROWTH) < 3.5
     assert _deviation(fit, "Tv_over_if", load.evaluate(speed) / base.model.i_f) < 3.5
     assert _deviation(fit, "J_vehicle", base.model.J_v) < 3.5
-
-
-def test_a_growing_load_that_is_left_out_is_allowed_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    base = load_scenario("throttle_steps")
-    load = RoadLoad(base.model.load.constant, aero=GROWTH)
-    made = record_bench(replace(base, model=replace(base.model, load=load)), 0, Knowledge())
-    monkeypatch.setattr(candidates, "SHOWN", np.inf)
-    fit, notes = _chosen(made)
-    assert AERO not in fit.point.names
-    assert Code.LOAD_GROWS not in [note.code for note in notes]
-    k = fit.point.names.index("J_vehicle")
-    far = abs(fit.point["J_vehicle"] - base.model.J_v)
-    assert far > 5.0 * np.sqrt(compute_covariance(fit.problem, fit.normal, fit.chi2)[k, k])
-    told = correct_fit(fit, EffectPriors())
-    assert told is not None
-    error = abs(told.mean["J_vehicle"] - base.model.J_v)
-    assert error < 2.0 * np.sqrt(told.covariance[k, k])
-
-
-def test_a_load_that_does_not_grow_leaves_its_level_known_without_another_search(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    made = record_bench(load_scenario("paper_steps"), 0, Knowledge())
-    monkeypatch.setattr(
-        selection_module, "SELECTION", replace(selection_module.SELECTION, max_restricted_work=0.0)
-    )
-    fit, _ = _chosen(made)
-    names, truth = fit.point.names, truth_of(made)
-    assert AERO not in names
-    assert fit.mean.names == names
-    assert all(term.structure.get_value(fit.point, AERO) == 0.0 for term in fit.problem.terms)
-    again = fit_local(fit.problem, fit.point)
-    assert again is not None
-    std, expected = (np.sqrt(np.diag(one.covariance)) for one in (fit, again))
-    assert std == pytest.approx(expected, rel=0.02)
-    assert np.all(np.abs(fit.point.values - again.point.values) < 0.2 * expected)
-    assert _deviation(fit, "Tv_over_if", truth["Tv_over_if"]) < 3.5
 
 
 @pytest.mark.parametrize("rate", mark_repeats([100.0, 500.0, 1000.0], [100.0]))

@@ -101,17 +101,3 @@ def test_a_gain_error_of_the_engine_torque_is_taken_for_efficiency() -> None:
 def test_frequency_and_damping_ratio_do_not_hang_on_the_scale_of_torque() -> None:
     for name in ("f_d_3", "zeta_3"):
         assert percent(name, "output_torque gain") == pytest.approx(0.0, abs=0.02)
-
-
-def test_every_sensor_has_a_gain_an_offset_and_an_age() -> None:
-    roles = {error.rsplit(" ", 1)[0] for error in found().errors}
-    assert {"engine_torque", "output_torque", "input_speed", "pressure.B3"} <= roles
-    assert len(found().errors) == 3 * len(roles)
-    assert found().change.shape == (len(found().ids), len(found().errors))
-    assert np.isfinite(found().change).all()
-
-
-def test_an_offset_is_a_share_of_the_largest_reading() -> None:
-    torque = bench().signals.engine_torque.values
-    size = found().sizes[found().errors.index("engine_torque offset")]
-    assert size == pytest.approx(0.01 * np.abs(torque).max(), rel=0.02)
