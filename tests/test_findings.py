@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Findings and their catalogue: one entry for each code, texts from the numbers."""
+"""Findings: one contract for every code of the catalogue, and remedies that fit the card."""
 
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
-from string import Formatter
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
-from drivetwin import findings
+import drivetwin
+from drivetwin.cli import main
 from drivetwin.errors import Where
+from drivetwin.estimation.likelihood.uncertainty.torque_scale import OverEta, estimate_absolute
 from drivetwin.files.records import FindingRecord
 from drivetwin.findings import (
     Code,
+    Finding,
     Number,
     Severity,
     list_fields,
@@ -22,70 +28,71 @@ from drivetwin.findings import (
     select_warnings,
     sort_by_severity,
 )
+from tests.support.repeats import mark_repeats
+from tools.findings_page import PAGE, ROOT, make_anchor, write_page
+
+PACKAGE = Path(drivetwin.__file__).parent
 
 
-def test_every_code_has_an_entry_and_each_entry_a_code() -> None:
-    assert sorted(load_catalogue()) == sorted(Code)
+@cache
+def read_sources() -> str:
+    """Text of all sources that can report a finding."""
+    paths = [*PACKAGE.rglob("*.py"), *PACKAGE.rglob("card_*.toml")]
+    return "".join(path.read_text(encoding="utf-8") for path in paths)
 
 
-def test_every_code_is_reported_somewhere() -> None:
-    package = Path(findings.__file__).parent
-    sources = "".join(path.read_text(encoding="utf-8") for path in package.rglob("*.py"))
-    sources += "".join(path.read_text(encoding="utf-8") for path in package.rglob("card_*.toml"))
-    names = [(code.name, rf"Code\.{code.name}\b|finding = \"{code.value}\"") for code in Code]
-    assert [name for name, pattern in names if not re.search(pattern, sources)] == []
+@cache
+def read_rows() -> dict[str, str]:
+    """Anchor of the question by code, as the page of findings links it."""
+    rows = re.findall(r"^\| `(\w+)`.*questions\.md#([^)]+)\) \|$", write_page(), re.MULTILINE)
+    return dict(rows)
+
+
+def fill(code: Code) -> Finding:
+    """A finding of the code; its names end in a period, as the advice on an effect does."""
+    fields = list_fields(code).items()
+    names = {name: "a name." for name, spec in fields if not spec}
+    return report(
+        code, "x", Where(time=1.5), **names, **{name: 1.0 for name, spec in fields if spec}
+    )
 
 
 @pytest.mark.parametrize("code", Code)
-def test_a_filled_text_has_no_double_stop(code: Code) -> None:
-    """Names that end in a period, such as the advice on an effect."""
-    names = {name: "a name." for name, spec in list_fields(code).items() if not spec}
-    numbers = {name: 1.0 for name, spec in list_fields(code).items() if spec}
-    text = report(code, "x", **names, **numbers).text
-    assert not re.search(r"\.[.;,)]|  |[a-z][.?!][A-Z]", text)
-
-
-@pytest.mark.parametrize("code", Code)
-def test_texts_are_sentences(code: Code) -> None:
+def test_a_code_keeps_the_contract_of_findings(code: Code) -> None:
+    """Sentences in the catalogue, a reporter, an answer on the page, and a record of all of it."""
     entry = load_catalogue()[code]
     for text in (entry.text, entry.remedy):
         assert not text.endswith((".", " "))
         assert text[:1] == text[:1].upper()
-    fields = [name for _, name, _, _ in Formatter().parse(entry.text + entry.remedy) if name]
-    assert all(name.isidentifier() for name in fields)
+        assert "`" not in text
+    one = fill(code)
+    assert not re.search(r"\.[.;,)]|  |[a-z][.?!][A-Z]| [,.;:]", one.text)
+    assert one.text.endswith((".", "?", "!"))
+    assert re.search(rf"Code\.{code.name}\b|finding = \"{code.value}\"", read_sources())
+    questions = (ROOT / "docs" / "questions.md").read_text(encoding="utf-8")
+    titles = re.findall(r"^## (.+)$", questions, re.MULTILINE)
+    assert read_rows()[code.value] in {make_anchor(title) for title in titles}
+    record = FindingRecord.model_validate_json(FindingRecord.from_result(one).model_dump_json())
+    assert record.to_finding() == one
+    assert (record.severity, record.text) == (entry.severity, one.text)
+
+
+def test_catalogue_and_page_have_each_code_once() -> None:
+    assert sorted(load_catalogue()) == sorted(Code)
+    assert PAGE.read_text(encoding="utf-8") == write_page()
 
 
 def test_a_finding_shows_place_subject_numbers_and_remedy() -> None:
-    place = Where(file="a.csv")
     limit = Number(2e5, "Pa")
-    one = report(Code.AT_BOUND, "P0.B3", place, limit=limit, side="larger")
+    one = report(Code.AT_BOUND, "P0.B3", Where(file="a.csv"), limit=limit, side="larger")
     assert one.text == (
         "a.csv: P0.B3: 2.000 bar is the bound of the search; the log indicates a larger value."
     )
-    assert one.severity is Severity.ERROR
-    assert one.names == {"side": "larger"}
-    assert one.numbers == {"limit": limit}
+    assert (one.names, one.numbers) == ({"side": "larger"}, {"limit": limit})
     assert one.set_subject("other") == one
-    assert report(Code.LOCKUP_UNKNOWN, channel="x").text.endswith("'lockup_engaged'.")
-
-
-def test_the_subject_is_not_repeated() -> None:
     values = {"card": Number(1.0, "kg*m^2", 0.1), "log": Number(2.0, "kg*m^2", 0.1)}
     text = report(Code.CARD_CONTRADICTED, "J_out", **values, apart=7.1).text
     assert text.startswith("J_out: the vehicle card has 1.00 ± 0.10 kg·m², the log gives 2.00 ±")
-
-
-def test_information_is_no_warning() -> None:
-    told = report(Code.MEAN_SAMPLES, channels="engine speed")
-    assert select_warnings([told]) == ()
-
-
-def test_a_record_holds_all_of_a_finding() -> None:
-    one = report(Code.LOADS_DIFFER, "", Where(channel="x", time=1.5), low=1.0, high=2.5)
-    record = FindingRecord.model_validate_json(FindingRecord.from_result(one).model_dump_json())
-    assert (record.code, record.severity) == (Code.LOADS_DIFFER, Severity.INFO)
-    assert record.text == one.text
-    assert record.to_finding() == one
 
 
 def test_sorted_by_severity_errors_come_first_and_equals_keep_their_order() -> None:
@@ -96,3 +103,78 @@ def test_sorted_by_severity_errors_come_first_and_equals_keep_their_order() -> N
         report(Code.NO_SENSOR_TOLERANCES),
     )
     assert sort_by_severity([info, first, second, error]) == [error, first, second, info]
+    assert select_warnings([info, first]) == (first,)
+    assert info.severity is Severity.INFO
+
+
+STATED = """
+[sensors.engine_torque]
+gain_tolerance = 0.01
+offset_tolerance_Nm = 5.0
+[sensors.output_torque]
+gain_tolerance = 0.01
+offset_tolerance_Nm = 20.0
+[effects]
+input_drag = 0.005
+"""
+"""Entries that a made card lacks; the rest of the card states everything else."""
+
+
+def list_asked(remedy: str, card: str) -> set[str]:
+    """List the entries of a card that a remedy asks to enter or to state."""
+    asked = re.findall(r"\b(?:enter|state)\b[^.;]*", remedy, re.IGNORECASE)
+    keys = re.findall(r"^\[*([\w.]+)[\]]*(?: =|$)", card, re.MULTILINE)
+    known = {part for key in keys for part in key.split(".")} - {"name", "value", "std"}
+    known |= {key.removesuffix("_kgm2") for key in known}
+    return known & {word for text in asked for word in re.findall(r"\w+", text)}
+
+
+def test_a_stated_scale_that_the_log_contradicts_is_not_asked_for() -> None:
+    nothing = np.zeros((1, 1))
+    over_eta = OverEta({"J_vehicle_over_eta": 1.0}, nothing, nothing, {})
+    for known, code in (
+        ({}, Code.NO_TORQUE_SCALE),
+        ({"J_vehicle": 6e4}, Code.LOG_CONTRADICTS_CARD),
+    ):
+        driveline: Any = SimpleNamespace(known=known)
+        one = estimate_absolute(["J_vehicle"], over_eta, None, driveline)["J_vehicle"]
+        assert one.reason.startswith(report(code).reason)
+
+
+def test_a_request_is_recognised() -> None:
+    scale = report(Code.NO_TORQUE_SCALE).remedy
+    assert list_asked(scale, "[inertia]\nJ_vehicle_kgm2 = 1.0") == {"J_vehicle_kgm2"}
+    assert list_asked(scale, "[inertia]\nJ_out_kgm2 = 1.0") == set()
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        drivetwin.Method.INTEGRAL,
+        pytest.param(drivetwin.Method.LIKELIHOOD, marks=pytest.mark.exhaustive),
+    ],
+)
+@pytest.mark.parametrize("scenario", mark_repeats(("paper_steps", "dual_clutch"), ("paper_steps",)))
+def test_a_remedy_never_asks_for_what_is_stated(
+    scenario: str, method: drivetwin.Method, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, log_path = tmp_path / "log.card.toml", tmp_path / "log.csv"
+    assert main(["synth", "--scenario", scenario, "--seed", "1", "-o", str(log_path)]) == 0
+    text = path.read_text(encoding="utf-8") + STATED
+    path.write_text(text, encoding="utf-8")
+    card = drivetwin.load_card(path)
+    log = drivetwin.read_log(log_path, card)
+    shifts = drivetwin.detect_shifts(log, card)
+    found = drivetwin.identify(log, card, shifts, method)
+    told = [one.remedy for one in found.findings]
+    told += [one.reason for one in found.estimates.values()]
+    for command in (["inspect"], ["shifts"], ["card", "check"]):
+        capsys.readouterr()
+        end = (
+            [str(path), str(log_path)]
+            if command[0] == "card"
+            else [str(log_path), "--vehicle", str(path)]
+        )
+        main([*command, *end])
+        told.append(" ".join(" ".join(capsys.readouterr()).split()))
+    assert {one: asked for one in told if (asked := list_asked(one, text))} == {}

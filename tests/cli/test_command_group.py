@@ -14,7 +14,6 @@ import drivetwin
 from drivetwin.cli import main
 from drivetwin.cli.app import COMMANDS
 from drivetwin.cli.command_group import CommandGroup
-from drivetwin.findings import load_catalogue
 
 PACKAGE = Path(drivetwin.__file__).parent
 GROUPS = {name: one for name, one in COMMANDS.items() if isinstance(one, CommandGroup)}
@@ -71,5 +70,3 @@ def test_no_text_of_the_package_has_backticks() -> None:
         if "`" in text
     ]
     assert marked == []
-    catalogue = load_catalogue().values()
-    assert [one for one in catalogue if "`" in one.text + one.remedy + str(one.columns)] == []

@@ -14,7 +14,7 @@ from drivetwin.estimation.paper.wlse import GridFit, GridRow
 from drivetwin.report.blocks import FigureBlock
 from drivetwin.report.figures.stage_results import plot_ringdown, plot_wlse
 from drivetwin.report.html import Store, encode_figure
-from drivetwin.report.sections.stage_results import INERTIA_LABELS, build_grid_table
+from drivetwin.report.sections.stage_results import INERTIA_LABELS
 
 
 def _fit() -> GridFit:
@@ -36,13 +36,6 @@ def test_every_sample_is_drawn_once_at_the_best_value() -> None:
     figure = plot_wlse(_fit(), INERTIA_LABELS)
     start, outside, inside = figure.data[:3]
     assert len(outside.x) + len(inside.x) == len(start.x) == 50
-
-
-def test_table_marks_the_row_of_least_error() -> None:
-    table = build_grid_table(_fit(), INERTIA_LABELS)
-    marked = [row[0].text for row in table.rows if row[3].text]
-    assert marked == ["0.85"]
-    assert [cell.text for cell in table.head[:2]] == ["η [–]", "J′ [kg·m²]"]
 
 
 def _ring() -> RingDown:

@@ -175,7 +175,7 @@ INPUT_DRAG = Effect(
     0.005,
     "typical range of open wet clutches and pump, 0.3 to 1 % of the rated torque; see Kitabayashi "
     "et al., SAE 2003-01-1973, on drag of wet clutches",
-    "calibrate the engine torque at zero load, or state the drag under [effects]",
+    "calibrate the engine torque at zero load, and measure the drag",
     build_input_drag,
     apply_input_drag,
 )
