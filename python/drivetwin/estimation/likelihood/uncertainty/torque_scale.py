@@ -162,9 +162,11 @@ def estimate_absolute(
     """Estimate absolute values by id; not identifiable without a scale, or if the log contradicts
     each value that the card states as one."""
     if scale is None:
-        over_eta = {one.removesuffix(OVER_ETA) for one in found.values if one.endswith(OVER_ETA)}
-        is_stated = not over_eta.isdisjoint(driveline.known)
-        reason = explain(Code.LOG_CONTRADICTS_CARD if is_stated else Code.NO_TORQUE_SCALE)
+        reason = explain(
+            Code.LOG_CONTRADICTS_CARD
+            if any(one + OVER_ETA in found.values for one in driveline.known)
+            else Code.NO_TORQUE_SCALE
+        )
         return {name: refuse_parameter(name, METHOD, reason) for name in names}
     ratios = [name.removesuffix(OVER_ETA) for name in scale.ids if name.endswith(OVER_ETA)]
     every = dict.fromkeys((*names, *ratios))
