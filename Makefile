@@ -69,7 +69,7 @@ test-rust: $(venv)/.dev ## tests of the core
 	cargo test --locked --quiet --package drivetwin-core --package drivetwin-table
 
 .PHONY: test-python
-hypothesis_examples ?= 40
+hypothesis_examples ?= 10
 test-python: export HYPOTHESIS_EXAMPLES := $(hypothesis_examples)
 test-python: $(venv)/.dev native ## tests of the package, without the suites that take long
 	$(pytest) --durations 50 --durations-min 2

@@ -20,7 +20,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # Tests share the cores, so the duration of an example is no property of the code.
 # In CI the examples are the same every day; `make nightly` searches longer, and elsewhere.
-EXAMPLES = int(os.environ.get("HYPOTHESIS_EXAMPLES", "40"))
+EXAMPLES = int(os.environ.get("HYPOTHESIS_EXAMPLES", "10"))
 settings.register_profile(
     "default",
     deadline=None,

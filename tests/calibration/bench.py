@@ -5,21 +5,29 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from drivetwin.calibration.driven import DrivenShift
 from drivetwin.calibration.input_path import DIRECT, InputPath
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
-from drivetwin.calibration.policies.controller import build_controller_policy
-from drivetwin.calibration.policy import Space
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.dyno.scenario import Sensor
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import TorqueError
+from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
+from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch
-from tests.calibration.cases import SYSTEM, build_profiles
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.simulate_log import LoggedShift
+from tests.calibration.cases import SYSTEM
 
 _SPEED, _TORQUE, _PRESSURE = Quantity.SPEED, Quantity.TORQUE, Quantity.PRESSURE
 SENSORS = (
@@ -31,6 +39,41 @@ SENSORS = (
     Sensor("wheel_speed", _SPEED, "SpdWhl", "rpm", 500.0, 0.01),
     Sensor("output_torque", _TORQUE, "TrqOut", "Nm", 500.0, 15.0),
 )
+
+
+REQUEST = 1.5
+"""Request in the logs of the bench [s]."""
+
+
+def build_profiles(shift: Maneuver, **values: float) -> Profiles:
+    """Return the profiles of the controller's policy, with other starting values."""
+    policy = POLICIES[PolicyKind.CONTROLLER](PolicySetup(shift, SYSTEM, None, 0.01))
+    policy = policy.set_start(values)
+    control = policy.build_control(np.array([one.start for one in policy.parameters]))
+    assert isinstance(control, Profiles)
+    return control
+
+
+def drive(
+    twin: Twin,
+    path: Path,
+    model: DualClutch,
+    *,
+    stated_late: float = 0.0,
+    known: bool = True,
+    **bench: Any,
+) -> DrivenShift:
+    """Write the log of a shift of `model` and read it with the profiles that were commanded.
+
+    The profiles are stated `stated_late` [s] behind; not `known`, the shift has none.
+    """
+    profiles = write_bench_log(path, model, **bench)
+    log, card = read_log(path, twin.build_card()), twin.build_card()
+    logged = LoggedShift(log, require_shifts(log, card).shifts[0])
+    if not known:
+        return DrivenShift(logged)
+    moved = (replace(one, time=one.time + stated_late) for one in profiles.signals.values())
+    return DrivenShift(logged, Profiles(*moved), REQUEST + stated_late)
 
 
 def write_bench_log(
@@ -46,9 +89,8 @@ def write_bench_log(
     Pressures act `late` [s] behind the logged ones, and all inputs by their `way`. Returns the
     commanded profiles on the clock of the log.
     """
-    shift = Maneuver(model, OperatingPoint(1400.0, 175.0), 0.5, request=1.5, horizon=4.0)
-    space = Space(build_controller_policy(shift, SYSTEM))
-    given = build_profiles(space, space.start)
+    shift = Maneuver(model, OperatingPoint(1400.0, 175.0), 0.5, request=REQUEST, horizon=4.0)
+    given = build_profiles(shift)
     seen = list_sampling_instants(SENSORS, shift.horizon)
     pressures = {"B2": given.offgoing, "B3": given.oncoming}
     late_way = replace(way, pressure_delay=late)

@@ -1,42 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""Shifts for the tests of calibration: an upshift, a downshift, small settings."""
+"""Tasks for the tests of calibration, from a twin as the command makes them, and their runs."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
-from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.actuator.model import ActuatorModel
-from drivetwin.calibration.calibrate import Task
+import numpy as np
+
+from drivetwin.calibration.calibrate import Task, draw_for
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
-from drivetwin.calibration.objective import Limit
-from drivetwin.calibration.policies.controller import build_controller_policy
-from drivetwin.calibration.policies.slip import SlipPolicy, build_slip_policy
-from drivetwin.calibration.policy import Space
-from drivetwin.calibration.profiles import Profiles
-from drivetwin.calibration.scenarios import (
-    Draw,
-    KnownDraws,
-    Purpose,
-    Scenarios,
-    draw_scenarios,
-)
+from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.metrics import list_outputs
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.profiles import ClosedLoop, Control, Profiles, compute_nominal_profiles
+from drivetwin.calibration.scenarios import Purpose, Scenarios, collect_scenarios
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.units import UnitDraws
-from drivetwin.simulation.dual_clutch import RoadLoad
-from drivetwin.simulation.shift_control import ControlledUnit
+from drivetwin.calibration.twin_task import Request, build_task
+from drivetwin.twin.twin import Twin
+from tests.calibration.twins import extend_twin, make_hydraulic_twin
 from tests.support.arrays import FloatArray
-from tests.support.upshift.scenario import build_model
-from tests.support.upshift.statement import BAR, make_problem
+from tests.support.upshift.statement import BAR
 
 SYSTEM = 10.0 * BAR
-ACTUATOR = IdentifiedActuator.from_design(ActuatorModel(0.02, 0.0265, 0.0265, 0.9))
-FILLING = IdentifiedActuator.from_design(
-    ActuatorModel(0.03, 0.02, 0.03, 0.9, 0.9 * BAR, 0.08, 0.05 * BAR)
-)
-"""Actuators without and with a fill time and hysteresis."""
 QUICK = CalibrationSettings(
     starts=2,
     finalists=1,
@@ -61,73 +48,67 @@ QUICK = CalibrationSettings(
 )
 
 
-def make_upshift(step: float = 1e-3) -> Maneuver:
-    """Power-on upshift 2-3 of a heavy truck."""
-    return Maneuver(build_model(make_problem()), OperatingPoint(1400.0, 185.0), 0.5, step=step)
-
-
-def make_downshift() -> Maneuver:
-    """Power-off downshift 3-2 of the same truck on a slope."""
-    model = build_model(make_problem())
-    old, new = model.elements
-    model = replace(model, elements=(new, old), load=RoadLoad(constant=-2000.0))
-    return Maneuver(model, OperatingPoint(-150.0, 120.0), 0.5)
-
-
-def make_power_on_downshift() -> Maneuver:
-    """Power-on downshift 3-2 of the same truck."""
-    model = build_model(make_problem())
-    old, new = model.elements
-    return Maneuver(replace(model, elements=(new, old)), OperatingPoint(900.0, 120.0), 0.5)
-
-
-def make_power_off_upshift() -> Maneuver:
-    """Power-off upshift 2-3 of the same truck on a slope."""
-    model = replace(build_model(make_problem()), load=RoadLoad(constant=-2000.0))
-    return Maneuver(model, OperatingPoint(-150.0, 170.0), 0.5)
-
-
-def make_draw(maneuver: Maneuver, spread: Spread | None = None) -> Draw:
-    """Made units around the driveline of a shift."""
-    return Draw(KnownDraws(maneuver.model, spread or Spread()))
-
-
-def make_draws(maneuver: Maneuver, count: int, seed: int = 1) -> Scenarios:
-    """Scenarios of made units."""
-    return draw_scenarios(maneuver, make_draw(maneuver), count, seed, Purpose.SEARCH)
+SHIFTS: dict[str, dict[str, Any]] = {
+    "power-on upshift": {"gears": "23"},
+    "power-off downshift": {"gears": "32", "torque": -150.0, "speed": 120.0, "load": -2000.0},
+    "power-on downshift": {"gears": "32", "torque": 900.0, "speed": 120.0},
+    "power-off upshift": {"gears": "23", "torque": -150.0, "speed": 170.0, "load": -2000.0},
+}
+"""Arguments of `make_task` for each kind of shift; the last two have the inertia phase first."""
 
 
 def make_task(
-    limits: tuple[Limit, ...] = (), settings: CalibrationSettings = QUICK, seed: int = 1
+    gears: str = "23",
+    torque: float = 1400.0,
+    speed: float = 185.0,
+    load: float | None = None,
+    twin: Twin | None = None,
+    **given: Any,
 ) -> Task:
-    """Calibration of the upshift by the controller's policy."""
-    maneuver = make_upshift(step=2e-3)
-    policy = build_controller_policy(maneuver, SYSTEM)
-    return Task(maneuver, policy, make_draw(maneuver), limits, seed, settings)
+    """Return the task of a request; the load of the vehicle [N m] is that of the twin or given."""
+    twin = twin or make_hydraulic_twin()
+    if load is not None:
+        of = replace(twin.parameters["Tv_over_if"], value=load / twin.final_drive)
+        twin = replace(twin, parameters={**twin.parameters, "Tv_over_if": of})
+    for name, value in (("limits", ()), ("settings", QUICK), ("system_pressure", SYSTEM)):
+        given.setdefault(name, value)
+    given |= {"engine_torque": torque, "engine_speed": speed}
+    return build_task(twin, Request(gears=(gears[0], gears[1]), **given))
 
 
-def build_profiles(space: Space, coordinates: FloatArray) -> Profiles:
-    """Return the profiles of a policy that has no closed loop."""
-    control = space.build_control(coordinates)
-    assert isinstance(control, Profiles)
-    return control
+def make_task_with(values: Mapping[str, float], kind: PolicyKind = PolicyKind.CONTROLLER) -> Task:
+    """Return the task of a twin with more parameters, as those of an added element."""
+    return make_task(twin=extend_twin(make_hydraulic_twin(), values), policy=kind)
 
 
-def make_slip_policy(maneuver: Maneuver, actuator: IdentifiedActuator = ACTUATOR) -> SlipPolicy:
-    """Policy with a closed slip loop behind two equal actuators."""
-    unit = ControlledUnit(actuator.model, actuator.model, 0.05)
-    return build_slip_policy(maneuver, SYSTEM, unit, 0.01)
+def start(task: Task) -> Control:
+    """Return the control of the starting values."""
+    return task.policy.build_control(np.array([one.start for one in task.policy.parameters]))
 
 
-def make_slip_task(limits: tuple[Limit, ...] = ()) -> Task:
-    """Calibration of the upshift by a controller with a closed slip loop."""
-    maneuver = make_upshift(step=2e-3)
-    policy = make_slip_policy(maneuver)
-    units = UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread())
-    draw = Draw(make_draw(maneuver).driveline, units)
-    return Task(maneuver, policy, draw, limits, 1, QUICK)
+def start_profiles(task: Task) -> Profiles:
+    """Return the profiles at the clutches of the nominal driveline for the starting values."""
+    return compute_nominal_profiles(task.maneuver, start(task))
 
 
-def make_plant(maneuver: Maneuver) -> Plant:
+def draw(task: Task, count: int, purpose: str = "SEARCH") -> Scenarios:
+    """Draw scenarios of a task."""
+    return draw_for(task, count, Purpose[purpose])
+
+
+def make_nominal(task: Task, control: Control) -> Scenarios:
+    """Return the nominal driveline, with its actuators for a closed loop."""
+    nominal = collect_scenarios(task.maneuver, [task.maneuver.driveline])
+    return replace(nominal, units=[control.unit]) if isinstance(control, ClosedLoop) else nominal
+
+
+def make_plant(shift: Maneuver) -> Plant:
     """Plant on one thread."""
-    return Plant(maneuver, threads=1)
+    return Plant(shift, threads=1)
+
+
+def run_nominal(task: Task, control: Control) -> FloatArray:
+    """Return shaft torque, and torque and slip of both elements (5, n), nominal."""
+    shift, nominal = task.maneuver, make_nominal(task, control)
+    runs = make_plant(shift).simulate(control, nominal, list_outputs(shift))
+    return np.asarray(runs.columns[0])

@@ -4,24 +4,45 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from drivetwin.calibration.calibrate import draw_for
+from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.options import USUAL_WHEEL_RADIUS
+from drivetwin.calibration.oil import OilFriction
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.policies.slip import SlipPolicy
-from drivetwin.calibration.scenarios import Purpose
+from drivetwin.calibration.scenarios import draw_types
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
+from drivetwin.findings import Code
+from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import simulate as simulate_network
 from drivetwin.simulation.shift_control import ControlledUnit
-from tests.calibration.cases import ACTUATOR, FILLING, QUICK
-from tests.calibration.twins import ADDED_ELEMENTS, STD, extend_twin, make_hydraulic_twin, make_twin
+from tests.calibration.cases import (
+    QUICK,
+    SHIFTS,
+    SYSTEM,
+    draw,
+    make_plant,
+    make_task,
+    start,
+    start_profiles,
+)
+from tests.calibration.twins import (
+    ACTUATOR,
+    ADDED_ELEMENTS,
+    FILLING,
+    STD,
+    extend_twin,
+    make_exact_twin,
+    make_hydraulic_twin,
+    make_twin,
+)
 
 REQUEST = Request(gears=("2", "3"), settings=QUICK)
 _DRAWN = {"eta": "i_in.loss.eta", "k_o": "output shaft.stiffness", "J_vehicle": "J_v.inertia"}
@@ -44,7 +65,7 @@ def test_the_wheel_radius_is_that_of_the_request_then_that_of_the_twin() -> None
     for twin, request, radius in (
         (car, REQUEST, 0.31),
         (car, replace(REQUEST, wheel_radius=0.3), 0.3),
-        (make_twin(), REQUEST, USUAL_WHEEL_RADIUS),
+        (make_twin(), REQUEST, 0.5),
     ):
         assert build_task(twin, replace(request, limits=())).maneuver.wheel_radius == radius
 
@@ -52,7 +73,7 @@ def test_the_wheel_radius_is_that_of_the_request_then_that_of_the_twin() -> None
 def test_draws_have_the_covariance_of_the_twin() -> None:
     twin = make_twin()
     task = build_task(twin, replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=()))
-    sets = draw_for(task, 1500, Purpose.SEARCH).sets
+    sets = draw(task, 1500).sets
     for parameter, name in _DRAWN.items():
         value = twin.parameters[parameter].value
         assert value is not None
@@ -70,7 +91,7 @@ def test_draws_follow_correlations() -> None:
     covariance = twin.covariance.copy()
     covariance[a, b] = covariance[b, a] = 0.9 * np.sqrt(covariance[a, a] * covariance[b, b])
     task = build_task(replace(twin, covariance=covariance), replace(REQUEST, limits=()))
-    sets = draw_for(task, 800, Purpose.SEARCH).sets
+    sets = draw(task, 800).sets
     found = np.corrcoef(sets[_DRAWN["k_o"]], sets[_DRAWN["J_vehicle"]])
     assert found[0, 1] == pytest.approx(0.9, abs=0.03)
 
@@ -79,8 +100,7 @@ def test_draws_follow_correlations() -> None:
 def test_draws_contain_the_part(part: str) -> None:
     plain = replace(REQUEST, spread=Spread(0.0, 0.0, 0.0), limits=())
     task = build_task(extend_twin(make_twin(), ADDED_ELEMENTS[part]), plain)
-    assert task.maneuver.added != NO_ADDED_ELEMENTS
-    sets = draw_for(task, 600, Purpose.SEARCH).sets
+    sets = draw(task, 600).sets
     relative = {
         "input shaft": ("input shaft.stiffness", np.hypot(2.0 * STD, np.hypot(STD, 2**0.5 * STD))),
         "backlash": ("output shaft.gap", STD),
@@ -100,7 +120,7 @@ def test_a_part_without_an_interval_is_held() -> None:
     known = replace(twin, covariance_ids=ids, covariance=covariance)
     task = build_task(known, replace(REQUEST, limits=()))
     assert task.maneuver.added.gap == 0.02
-    assert "output shaft.gap" not in draw_for(task, 20, Purpose.SEARCH).sets
+    assert "output shaft.gap" not in draw(task, 20).sets
 
 
 def test_a_twin_without_identified_values_is_refused() -> None:
@@ -122,33 +142,177 @@ def test_what_the_twin_does_not_say_must_be_given() -> None:
 def test_a_slip_loop_has_the_actuators_of_the_twin() -> None:
     asked = replace(REQUEST, policy=PolicyKind.SLIP, task=0.02, engine_lag=0.03, limits=())
     task = build_task(make_hydraulic_twin(), asked)
-    assert isinstance(task.policy, SlipPolicy)
-    assert task.policy.base.task == 0.02
-    assert task.policy.unit == ControlledUnit(ACTUATOR.model, FILLING.model, 0.03)
-    units = draw_for(task, 5, Purpose.SEARCH).units
+    control: Any = start(task)
+    assert control.controller.task == 0.02
+    assert control.unit == ControlledUnit(ACTUATOR.model, FILLING.model, 0.03)
+    units = draw(task, 5).units
     assert len({one.oncoming.fill_time for one in units}) == 5
     with pytest.raises(InputError, match="no actuator of B2 and B3"):
         build_task(make_twin(), asked)
-
-
-@pytest.mark.parametrize("kind", [one for one in PolicyKind if one is not PolicyKind.OWN])
-def test_a_start_by_name(kind: PolicyKind) -> None:
-    twin = make_hydraulic_twin()
-    policy = build_task(twin, replace(REQUEST, policy=kind, limits=())).policy
-    one = next(one for one in policy.parameters if one.free)
-    start = {one.name: 0.9 * one.low + 0.1 * one.high}
-    task = build_task(twin, replace(REQUEST, policy=kind, start=start, limits=()))
-    assert {one.name: one.start for one in task.policy.parameters}.items() >= start.items()
-    with pytest.raises(InputError, match="no parameter wrong"):
-        build_task(twin, replace(REQUEST, policy=kind, start={"wrong": 0.1}, limits=()))
-
-
-def test_the_own_policy_needs_a_controller() -> None:
-    with pytest.raises(InputError, match="needs a controller"):
-        build_task(make_hydraulic_twin(), replace(REQUEST, policy=PolicyKind.OWN, limits=()))
 
 
 def test_a_downshift_with_power_has_its_own_parameters() -> None:
     task = build_task(make_twin(), replace(REQUEST, gears=("3", "2"), limits=()))
     assert task.maneuver.inertia_first
     assert "assist_pressure" in [one.name for one in task.policy.parameters]
+
+
+def make_exact_task(**spread: float) -> Any:
+    """Return a task of exact values, with a spread between units."""
+    none = Spread(gain=0.0, engine_torque=0.0, contact_pressure=0.0, oil_temperature=0.0)
+    return make_task(twin=make_exact_twin(), spread=replace(none, **spread))
+
+
+def test_units_have_the_stated_spread() -> None:
+    sets = draw(make_task(twin=make_exact_twin()), 3000).sets
+    for name, std in (("B3.gain", 0.025), ("i_in.loss.eta", 0.015)):
+        assert sets[name].std() / sets[name].mean() == pytest.approx(std, rel=0.06)
+    contact = [sets[f"{name}.p0"] - sets[f"{name}.p0"].mean() for name in ("B2", "B3")]
+    assert contact[0].std() == pytest.approx(5e3, rel=0.06)
+    assert contact[0] == pytest.approx(contact[1])
+
+
+def test_a_torque_scale_is_a_scale_of_the_torque() -> None:
+    task = make_exact_task(engine_torque=0.05)
+    shift, profiles, drawn = task.maneuver, start_profiles(task), draw(task, 1)
+    scale = float(drawn.sets["i_in.loss.eta"][0]) / shift.model.eta
+    louder = replace(shift, point=replace(shift.point, engine_torque=1400.0 * scale))
+    torque = Signal(profiles.engine_torque.time, scale * profiles.engine_torque.values)
+    pressures = {"B2": profiles.offgoing, "B3": profiles.oncoming}
+    exact = simulate(shift.model, torque, pressures, louder.build_start(), shift.time)
+    found = make_plant(shift).simulate(profiles, drawn, (shift.body.drive,)).columns[0, 0]
+    assert found == pytest.approx(exact.shaft_torque, abs=1e-5 * np.abs(exact.shaft_torque).max())
+
+
+def test_drawn_actuators_have_the_stated_spread_and_covariance() -> None:
+    covariance = np.zeros((7, 7))
+    covariance[4, 4], covariance[6, 6] = 400.0, np.inf
+    one = replace(FILLING, covariance=covariance)
+    twin = replace(make_hydraulic_twin(), actuators={"B2": one, "B3": one})
+    task = make_task(twin=twin, policy=PolicyKind.SLIP, spread=Spread(kiss_pressure=0.0))
+    units = draw(task, 3000).units
+    dead = np.array([each.oncoming.dead_time for each in units])
+    kiss = np.array([each.oncoming.kiss_pressure for each in units])
+    assert dead.std() == pytest.approx(5e-3, rel=0.06)
+    assert np.log([each.engine_lag for each in units]).std() == pytest.approx(0.15, rel=0.06)
+    assert kiss.std() == pytest.approx(20.0, rel=0.06)
+    assert {each.oncoming.hysteresis for each in units} == {one.model.hysteresis}
+    assert all(each.offgoing.dead_time == each.oncoming.dead_time for each in units)
+
+
+def test_draws_follow_seed_and_purpose_and_keep_their_units() -> None:
+    task = make_task(policy=PolicyKind.SLIP)
+    first, again, other = (draw(task, 6, one) for one in ("POLISH", "POLISH", "CERTIFICATE"))
+    odd = np.arange(6) % 2 == 1
+    both, order = first.select(odd).join(first.select(~odd)), [1, 3, 5, 0, 2, 4]
+    assert [first.units[k] for k in order] == list(both.units)
+    for name, values in first.sets.items():
+        assert (values == again.sets[name]).all()
+        assert (values != other.sets[name]).any()
+        assert np.array_equal(both.sets[name], values[order])
+
+
+def test_impossible_draws_are_not_run() -> None:
+    task = make_task()
+    body = task.maneuver.driveline
+    broken = replace(body, model=replace(body.model, k_o=-1.0))
+    draws = replace(task.draw, driveline=lambda _: lambda _: broken)
+    with pytest.raises(InputError, match="0 of 100 drawn drivelines"):
+        draw(replace(task, draw=draws), 5)
+
+
+@pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])
+def test_a_spread_is_finite_and_not_negative(value: float) -> None:
+    with pytest.raises(InputError, match="spread of gain"):
+        Spread(gain=value)
+
+
+def test_types_share_the_random_numbers_of_their_units() -> None:
+    task = make_task(oil_temperature=380.0, oil=OilFriction(-2e-3, 6e-4, log_temperature=340.0))
+    drawn = draw_types(task.maneuver, task.draw, 3, 40, 1)
+    contact = drawn.sets["B2.p0"].reshape(3, 40)
+    stiffness = drawn.sets["output shaft.stiffness"].reshape(3, 40)
+    assert (stiffness == stiffness[:, :1]).all()
+    assert len(set(stiffness[:, 0])) == 3
+    spread = contact - contact[:, :1]
+    assert spread[1] == pytest.approx(spread[0], abs=1e-6)
+    assert spread.std() == pytest.approx(5e3, rel=0.3)
+
+
+def test_oil_changes_the_friction_of_a_type_and_its_temperature_that_of_a_unit() -> None:
+    exact = make_exact_task()
+    known = OilFriction(-2e-3, 6e-4, log_temperature=340.0)
+    given: dict[str, Any] = {"twin": make_exact_twin(), "oil_temperature": 380.0, "oil": known}
+    hot: Any = make_task(**given, spread=exact.draw.driveline.spread)
+    cold, warm = (one.maneuver.model.elements[1].friction.mu_c for one in (exact, hot))
+    assert warm == pytest.approx(0.92 * cold)
+    levels = draw(hot, 600).sets["B3.friction.mu_c"]
+    assert levels.std() / levels.mean() == pytest.approx(40.0 * 6e-4 / 0.92, rel=0.1)
+    spread = replace(exact.draw.driveline.spread, oil_temperature=5.0)
+    made = make_task(twin=make_exact_twin(), spread=spread, oil=OilFriction(-2e-3, 0.0))
+    levels = draw(made, 600).sets["B3.friction.mu_c"]
+    assert levels.std() / levels.mean() == pytest.approx(5.0 * 2e-3, rel=0.1)
+    with pytest.raises(InputError, match="which oil temperature"):
+        make_task(oil_temperature=380.0)
+    logged = replace(make_twin(), validity={"oil_temperature": (330.0, 350.0)})
+    of_log: Any = make_task(twin=logged, oil_temperature=380.0, oil=OilFriction(-2e-3, 0.0))
+    assert of_log.maneuver.model.elements[1].friction.mu_c == pytest.approx(0.92 * cold)
+    assert of_log.maneuver.point.oil_temperature == 380.0
+
+
+@pytest.mark.parametrize("part", ["none", *ADDED_ELEMENTS])
+def test_start_accelerates_steadily(part: str) -> None:
+    twin = extend_twin(make_twin(), ADDED_ELEMENTS.get(part, {}))
+    shift = build_task(twin, replace(REQUEST, limits=())).maneuver
+    held = {"B2": SYSTEM, "B3": 0.0, "engine torque": shift.point.engine_torque}
+    time = shift.time[:300]
+    outputs: list[Any] = [("shaft_torque", "output shaft"), ("acceleration", "engine")]
+    inputs = {name: Signal(time[[0, -1]], np.full(2, one)) for name, one in held.items()}
+    run = simulate_network(shift.elements, inputs, shift.start, time, outputs)
+    torque, rate = (run.columns[one] for one in outputs)
+    assert np.ptp(torque) < 1e-4 * np.abs(torque).max()
+    ratio = shift.ratios[0]
+    expected = ratio * shift.compute_acceleration(shift.point.engine_torque, ratio)
+    # A slipping tyre turns faster than the vehicle, and accelerates by as much more.
+    assert rate == pytest.approx(expected, rel=0.01 if part == "tyre" else 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "torque", "first"),
+    [
+        ("power-on upshift", -100.0, True),
+        ("power-on upshift", 0.0, False),
+        ("power-on upshift", 100.0, False),
+        ("power-off downshift", 300.0, True),
+        ("power-off downshift", -300.0, False),
+    ],
+)
+def test_the_engine_moves_by_itself_where_its_torque_has_the_direction(
+    name: str, torque: float, first: bool
+) -> None:
+    shift = make_task(**SHIFTS[name]).maneuver
+    assert shift.direction == (-1.0 if name.endswith("upshift") else 1.0)
+    point = replace(shift.point, engine_torque=torque)
+    assert replace(shift, point=point).inertia_first is first
+
+
+def test_equal_gears_are_refused() -> None:
+    twin = make_twin()
+    elements = dict.fromkeys(twin.elements, twin.elements["B2"])
+    gears = {name: replace(one, ratio=twin.gears["2"].ratio) for name, one in twin.gears.items()}
+    with pytest.raises(InputError, match="same overall ratio"):
+        make_task(twin=replace(twin, elements=elements, gears=gears))
+
+
+def test_a_finding_names_what_leaves_the_identified_range_and_when() -> None:
+    base = make_twin()
+    twin = replace(base, validity={**base.validity, "speed": (60.0, 200.0)})
+    task = build_task(twin, replace(REQUEST, limits=()))
+    profiles = start_profiles(task)
+    assert check_identified_range(twin, task.maneuver, profiles) == ()
+    narrow = replace(twin, validity={**twin.validity, "torque": (1150.0, 1500.0)})
+    (found,) = check_identified_range(narrow, task.maneuver, profiles)
+    assert found.code is Code.OUTSIDE_IDENTIFIED_RANGE
+    assert found.subject == "torque"
+    torque = profiles.engine_torque
+    assert found.place.time == torque.time[np.argmin(torque.values)] - task.maneuver.request

@@ -9,15 +9,22 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.model import ActuatorModel
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, RIM_SHARE
-from drivetwin.simulation.dual_clutch import Stribeck
+from drivetwin.simulation.dual_clutch import DualClutch, Stribeck
 from drivetwin.simulation.network import Element, build_element
-from drivetwin.twin.twin import Twin, TwinElement, TwinGear
-from tests.calibration.cases import ACTUATOR, FILLING
-from tests.support.upshift.statement import make_problem
+from drivetwin.twin.twin import Twin, TwinElement, TwinGear, build_nominal_shift
+from tests.support.upshift.statement import BAR, make_problem
+
+ACTUATOR = IdentifiedActuator.from_design(ActuatorModel(0.02, 0.0265, 0.0265, 0.9))
+FILLING = IdentifiedActuator.from_design(
+    ActuatorModel(0.03, 0.02, 0.03, 0.9, 0.9 * BAR, 0.08, 0.05 * BAR)
+)
+"""Actuators without and with a fill time and hysteresis."""
 
 STD = 0.01
 """Relative standard deviation of every identified parameter."""
@@ -79,6 +86,19 @@ def make_twin(verdict: Verdict = Verdict.IDENTIFIED) -> Twin:
 def make_hydraulic_twin() -> Twin:
     """Return the same twin with actuators."""
     return replace(make_twin(), actuators={"B2": ACTUATOR, "B3": FILLING})
+
+
+def make_exact_twin() -> Twin:
+    """Return the twin with actuators without a fill time, and with exact values."""
+    twin = make_twin()
+    friction = {k: replace(v, mu_lo=v.mu, mu_hi=v.mu) for k, v in twin.friction.items()}
+    actuators = {"B2": ACTUATOR, "B3": ACTUATOR}
+    return replace(twin, covariance_ids=(), covariance=None, friction=friction, actuators=actuators)
+
+
+def build_model(twin: Twin) -> DualClutch:
+    """Return the driveline of the upshift."""
+    return twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
 
 
 ADDED_ELEMENTS = {

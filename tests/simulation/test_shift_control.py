@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
+from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import Signal
@@ -24,13 +26,14 @@ from drivetwin.simulation.shift_control import (
     ControlledUnit,
     simulate_network_controlled,
 )
-from tests.calibration.cases import make_slip_policy, make_upshift
+from tests.calibration.cases import make_task
+from tests.calibration.twins import make_exact_twin
 from tests.support.arrays import FloatArray
 
-SHIFT = make_upshift()
-POLICY = make_slip_policy(SHIFT)
+TASK = make_task(twin=make_exact_twin(), policy=PolicyKind.SLIP)
+SHIFT, POLICY = TASK.maneuver, cast(Any, TASK.policy)
 CONTROLLER = POLICY.base
-OUTPUTS: list[Output] = [("shaft_torque", "output shaft"), ("slip", "2"), ("slip", "3")]
+OUTPUTS: list[Output] = [("shaft_torque", "output shaft"), ("slip", "B2"), ("slip", "B3")]
 ACTUATORS = st.builds(
     ActuatorModel,
     dead_time=st.floats(0.0, 0.05),
@@ -77,14 +80,14 @@ def test_motion_is_that_of_the_same_inputs_without_controller() -> None:
     batch = run(POLICY.unit)
     columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
     signals = {name: Signal(SHIFT.time, values) for name, values in columns.items()}
-    pressures = {"2": signals["pressure.offgoing"], "3": signals["pressure.oncoming"]}
+    pressures = {"B2": signals["pressure.offgoing"], "B3": signals["pressure.oncoming"]}
     start = SHIFT.build_start()
     exact = simulate(SHIFT.model, signals["engine_torque"], pressures, start, SHIFT.time)
     assert not batch.failed
     largest = np.abs(exact.shaft_torque).max()
     assert batch.values[0, 0, 0] == pytest.approx(exact.shaft_torque, abs=1e-5 * largest)
-    assert batch.values[0, 0, 2] == pytest.approx(exact.slip["3"], abs=1e-4)
-    locks = [one.time for one in exact.events if one.kind == "lock" and one.element == "3"]
+    assert batch.values[0, 0, 2] == pytest.approx(exact.slip["B3"], abs=1e-4)
+    locks = [one.time for one in exact.events if one.kind == "lock" and one.element == "B3"]
     assert batch.last_lock[0, 0] == pytest.approx(locks[-1], abs=1e-6)
 
 
@@ -92,10 +95,10 @@ def test_runs_do_not_depend_on_their_neighbours_and_threads() -> None:
     units = [replace(POLICY.unit, engine_lag=lag) for lag in (0.02, 0.05, 0.1)]
     gains = SHIFT.oncoming.gain * np.array([0.95, 1.0, 1.05])
     controllers = [CONTROLLER, replace(CONTROLLER, gain=2.0 * CONTROLLER.gain)]
-    whole = make_network(units, {"3.gain": gains})
+    whole = make_network(units, {"B3.gain": gains})
     together = simulate_network_controlled(whole, controllers, SHIFT.time, OUTPUTS)
     for k, unit in enumerate(units):
-        one = replace(whole, units=[unit], parameters={"3.gain": gains[k : k + 1]})
+        one = replace(whole, units=[unit], parameters={"B3.gain": gains[k : k + 1]})
         alone = simulate_network_controlled(one, controllers[1:], SHIFT.time, OUTPUTS, threads=1)
         assert np.array_equal(alone.values[0, 0], together.values[k, 1])
         assert alone.last_lock[0, 0] == together.last_lock[k, 1]
@@ -112,7 +115,7 @@ def test_what_makes_no_batch_is_refused() -> None:
     with pytest.raises(InputError, match="unknown"):
         simulate_network_controlled(wrong, [CONTROLLER], SHIFT.time, OUTPUTS)
     for changed, text in (
-        (replace(CONTROLLER, oncoming="4"), 'clutch "4" is unknown; known are 2, 3'),
+        (replace(CONTROLLER, oncoming="B4"), 'clutch "B4" is unknown; known are B2, B3'),
         (replace(CONTROLLER, gain=float("nan")), "not a finite number"),
     ):
         with pytest.raises(InputError, match=text):
@@ -125,7 +128,7 @@ def test_what_makes_no_batch_is_refused() -> None:
 
 def test_other_inputs_act_as_given() -> None:
     gains = SHIFT.oncoming.gain * np.array([0.95, 1.05])
-    network = make_network([POLICY.unit] * 2, {"3.gain": gains})
+    network = make_network([POLICY.unit] * 2, {"B3.gain": gains})
     middle = 0.5 * (SHIFT.time[0] + SHIFT.time[-1])
     times = np.array([SHIFT.time[0], middle, middle + 0.01, SHIFT.time[-1]])
     brake = Signal(times, np.array([0.0, 0.0, -500.0, -500.0]))
@@ -142,10 +145,10 @@ def test_other_inputs_act_as_given() -> None:
     )
     assert not batch.failed
     columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
-    given = {"engine torque": "engine_torque", "2": "pressure.offgoing", "3": "pressure.oncoming"}
+    given = {"engine torque": "engine_torque", "B2": "pressure.offgoing", "B3": "pressure.oncoming"}
     inputs = {name: Signal(SHIFT.time, columns[column]) for name, column in given.items()}
     lighter = [
-        {**one, "gain": network.parameters["3.gain"][0]} if one["name"] == "3" else one
+        {**one, "gain": network.parameters["B3.gain"][0]} if one["name"] == "B3" else one
         for one in elements
     ]
     run = simulate_network(lighter, {**inputs, "M": brake}, network.start, SHIFT.time, OUTPUTS)
@@ -155,11 +158,11 @@ def test_other_inputs_act_as_given() -> None:
 
 def test_a_network_without_what_is_controlled_is_refused() -> None:
     gains = SHIFT.oncoming.gain * np.array([0.95, 1.05])
-    network = make_network([POLICY.unit] * 2, {"3.gain": gains})
-    changed = replace(network, parameters={"3.gian": np.ones(2)})
+    network = make_network([POLICY.unit] * 2, {"B3.gain": gains})
+    changed = replace(network, parameters={"B3.gian": np.ones(2)})
     with pytest.raises(InputError, match="did you mean 'gain'"):
         simulate_network_controlled(changed, [CONTROLLER], SHIFT.time, OUTPUTS)
     other = replace(CONTROLLER, oncoming="load")
-    inputs = {"3": Signal(SHIFT.time, np.zeros(SHIFT.time.size))}
-    with pytest.raises(InputError, match='clutch "load" is unknown; known are 2, 3'):
+    inputs = {"B3": Signal(SHIFT.time, np.zeros(SHIFT.time.size))}
+    with pytest.raises(InputError, match='clutch "load" is unknown; known are B2, B3'):
         simulate_network_controlled(replace(network, inputs=inputs), [other], SHIFT.time, OUTPUTS)

@@ -37,6 +37,7 @@ def check_inside(found: Identification, truth: dict[str, float], names: Sequence
     assert not {one.code for one in found.findings} & ACCUSATIONS
 
 
+@pytest.mark.exhaustive
 def test_a_true_card_is_not_accused_by_wide_intervals() -> None:
     """The card's P0 is 1.8 deviations off; 5.7 by the variance that sensors and effects widen."""
     found, truth = identify("in_316")

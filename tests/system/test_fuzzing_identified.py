@@ -16,8 +16,8 @@ from tests.fuzz.identified import Base, base, identified, parted, reports_damage
 from tests.fuzz.tables import DAMAGING, HARMLESS
 from tests.support.repeats import mark_repeats
 
-HARMLESS_DAILY = ("other_units", "later_clock", "missing_outside")
-"""Changes of the numbers, of the time and of the samples; the others change the text alone."""
+HARMLESS_DAILY = ("other_units",)
+"""A change of the numbers; the others are of time, samples and text."""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_harmless_changes_leave_the_result(kind: str, sound: Base, tmp_path: Pat
 
 TELLING = ("missing_anywhere", "stuck", "dropout", "spiked", "wrapped", "exchanged", "bad_clock")
 """Damage that must be refused or reported in any channel; other damage may stay unnoticed."""
-DAMAGING_DAILY = (*TELLING, "cut", "late")
+DAMAGING_DAILY = ("missing_anywhere", "stuck", "exchanged", "late")
 
 
 @pytest.mark.parametrize("kind", mark_repeats(DAMAGING, DAMAGING_DAILY))
@@ -48,7 +48,11 @@ def test_damage_ends_as_a_result_or_a_typed_error(kind: str, sound: Base, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("name", "gap"), [("SpdOut", slice(-29, -16)), ("SpdIn", slice(-108, -49))]
+    ("name", "gap"),
+    [
+        ("SpdOut", slice(-29, -16)),
+        pytest.param("SpdIn", slice(-108, -49), marks=pytest.mark.exhaustive),
+    ],
 )
 def test_a_gap_shortly_before_the_end_costs_nothing_else(
     name: str, gap: slice, sound: Base, tmp_path: Path

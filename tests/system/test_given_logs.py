@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from drivetwin.cli import main
+from tests.support.repeats import mark_repeats
 
 ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT.parent / "shared" / "logs"
@@ -36,7 +37,7 @@ def _run_identify(log: Path, card: Path) -> tuple[frozenset[str], dict[str, Any]
         return files, json.loads((out / "result.json").read_text())
 
 
-@pytest.mark.parametrize("name", ["truck_a", "paper_like"])
+@pytest.mark.parametrize("name", mark_repeats(["truck_a", "paper_like"], ["paper_like"]))
 def test_writes_three_files(name: str) -> None:
     files, result = _identify(name)
     assert files == {"result.json", "twin.toml", "report.html"}

@@ -5,22 +5,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.policies import own
-from drivetwin.calibration.policy import Space
-from drivetwin.calibration.profiles import ClosedLoop
-from drivetwin.calibration.scenarios import Draw, Purpose, draw_scenarios
-from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.units import UnitDraws
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policies.own import HEADER, UserController
 from drivetwin.errors import ControllerError
 from drivetwin.export.compiler import compile_library
 from drivetwin.simulation.shift_control import ExternalController, ShiftController
-from tests.calibration.cases import ACTUATOR, make_draw, make_plant, make_slip_policy, make_upshift
+from tests.calibration.cases import draw, make_plant, make_task, start
 
 FIELDS = (
     *("fill_pressure", "fill_time", "kiss_pressure", "torque_phase_time", "handover_pressure"),
@@ -37,7 +34,7 @@ def build(folder: Path, source: str) -> Path:
     path = folder / "controller.c"
     path.write_text(source)
     library = folder / "controller.so"
-    compile_library([path], library, None, headers=[own.HEADER.parent])
+    compile_library([path], library, None, headers=[HEADER.parent])
     return library
 
 
@@ -65,15 +62,11 @@ def to_external(given: ShiftController, library: Path) -> ExternalController:
 def evaluate(
     library: Path, external: bool
 ) -> dict[Metric, np.ndarray[tuple[int], np.dtype[np.float64]]]:
-    shift = make_upshift()
-    policy = make_slip_policy(shift)
-    draw = Draw(make_draw(shift).driveline, UnitDraws(ACTUATOR, ACTUATOR, 0.05, Spread()))
-    draws = draw_scenarios(shift, draw, 12, 1, Purpose.SEARCH)
-    control = policy.build_control(Space(policy).to_values(Space(policy).start))
-    assert isinstance(control.controller, ShiftController)
+    task = make_task(policy=PolicyKind.SLIP)
+    control: Any = start(task)
     if external:
-        control = ClosedLoop(to_external(control.controller, library), control.unit)
-    return dict(make_plant(shift).evaluate(control, draws).values)
+        control = replace(control, controller=to_external(control.controller, library))
+    return dict(make_plant(task.maneuver).evaluate(control, draw(task, 12)).values)
 
 
 def test_slip_policy_in_c_equals_the_built_in_one(slip_library: Path) -> None:
@@ -116,6 +109,6 @@ def test_faults_name_the_task_and_its_inputs(
 
 
 def test_table_parameters_keep_their_breakpoints() -> None:
-    given = own.UserController(Path("x"), (), (0.0, 1.0, 5.0, 6.0), (2, 3), 0.01, 353.0)
+    given = UserController(Path("x"), (), (0.0, 1.0, 5.0, 6.0), (2, 3), 0.01, 353.0)
     assert given.fill([7.0, 8.0]) == (0.0, 1.0, 7.0, 8.0)
     assert replace(given, places=()).fill([]) == given.numbers

@@ -204,7 +204,7 @@ def _pass_task(
             t_eval=np.append(instants, end), events=[_make_event(one) for _, one in guards],
             rtol=_RTOL, atol=_ATOL, max_step=STEP,
         )  # fmt: skip
-        for moment, state in zip(piece.t, piece.y.T, strict=True):
+        for moment, state in zip(piece.t, np.asarray(piece.y).T, strict=True):
             if moment < end:
                 columns[:, round(moment / STEP)] = _read(equations, moment, state.tolist(), mode)
         pairs = zip(piece.t_events or [], piece.y_events or [], guards, strict=True)
