@@ -10,7 +10,7 @@ in one experiment for the estimation (pressure up and down again) and in one for
 
     J1·ω1' = T - T_c       J2·ω2' = T_c       T_c = μ(s)·gain·P,  s = ω1 - ω2
 
-Data: the network of elements, with noise. Estimate: least squares with exact sensitivities
+Data: a run of the model, with noise. Estimate: least squares with exact sensitivities
 through the moments at which the clutch locks and breaks away, from start values twice too high.
 
     python -m examples.clutch_friction
@@ -18,22 +18,17 @@ through the moments at which the clutch locks and breaks away, from start values
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from drivetwin.simulation import network
-from drivetwin.simulation.dual_clutch import (
-    DualClutch,
-    FrictionTable,
-    RoadLoad,
-    ShiftElement,
-    Signal,
-    State,
-)
-from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
+from drivetwin import Model
+from drivetwin.modeling.plates import Plates
+from drivetwin.simulation.dual_clutch import FrictionTable, Signal
+from drivetwin.simulation.network import Output
 
 FloatArray = NDArray[np.float64]
 
@@ -41,15 +36,16 @@ TRUTH = (0.30, 0.22)
 """C1 at 0 rad/s and C2 at 10 rad/s."""
 START = (0.60, 0.44)
 SLIP = (0.0, 10.0)
-INERTIAS = (1.2, 0.8)
+NODES, INERTIAS = ("1", "2"), (1.2, 0.8)
+SPEEDS: list[Output] = [("speed", node) for node in NODES]
 TORQUE = 20.0
 GAIN = 3.0e-4
 """Friction radius times area times surfaces [m^3]."""
 NOISE = 0.05
 """Standard deviation of each speed [rad/s]."""
 DURATION, RATE = 3.0, 200.0
-NAMES = ("C.mu.0", "C.mu.1")
-"""The unknowns as the core calls them: points 0 and 1 of the clutch's table."""
+UNKNOWNS = ("C.friction.mu.0", "C.friction.mu.1")
+"""Paths of the unknowns: points 0 and 1 of the clutch's table."""
 
 
 @dataclass(frozen=True)
@@ -81,61 +77,33 @@ def periodic() -> Signal:
     return Signal(time, 0.6e5 * (1.0 - np.cos(2.0 * np.pi * time)))
 
 
+def build(coefficients: Sequence[float], pressure: Signal) -> Model:
+    """Build two inertias at rest with a clutch between them."""
+    model = Model("clutch bench")
+    for node, inertia in zip(NODES, INERTIAS, strict=True):
+        model.inertia(f"inertia {node}", inertia, node)
+    model.torque("drive", NODES[0], TORQUE)
+    plates = Plates(FrictionTable(SLIP, tuple(coefficients)), gain=GAIN)
+    model.clutch("C", *NODES, pressure=pressure, plates=plates)
+    model.start(dict.fromkeys(NODES, 0.0))
+    return model
+
+
 def recorded(pressure: Signal, seed: int) -> Experiment:
-    """An experiment on the network of two inertias and a clutch, with noise on both speeds."""
-    elements: list[network.Element] = [
-        {"type": "torque", "name": "drive", "node": "1", "input": "torque"},
-        {"type": "inertia", "name": "inertia 1", "node": "1", "inertia": INERTIAS[0]},
-        {"type": "inertia", "name": "inertia 2", "node": "2", "inertia": INERTIAS[1]},
-        {
-            "type": "clutch", "name": "C", "a": "1", "b": "2", "gain": GAIN, "p0": 0.0, "peak": 1.0,
-            "pressure": "pressure", "drum_inertia": 0.0,
-            "friction": {"slip": list(SLIP), "mu": list(TRUTH), "extend": False},
-        },
-    ]  # fmt: skip
+    """Simulate an experiment, with noise on both speeds."""
     time = np.arange(int(DURATION * RATE) + 1) / RATE
-    torque = Signal(time[[0, -1]], np.full(2, TORQUE))
-    run = network.simulate(
-        elements,
-        {"torque": torque, "pressure": pressure},
-        network.Start({"1": 0.0, "2": 0.0}),
-        time,
-        [("speed", "1"), ("speed", "2")],
-    )
-    exact = np.column_stack([run.columns["speed", node] for node in ("1", "2")])
+    run = build(TRUTH, pressure).simulate(time, record=SPEEDS)
+    exact = np.column_stack([run[speed] for speed in SPEEDS])
     noise = NOISE * np.random.default_rng(seed).standard_normal(exact.shape)
     return Experiment(time, pressure, exact + noise)
 
 
-def model(coefficients: FloatArray) -> DualClutch:
-    """The same as a driveline whose output shaft carries nothing."""
-    clutch = ShiftElement(
-        "C", 1.0, 1.0, GAIN, 0.0, FrictionTable(SLIP, tuple(coefficients.tolist()))
-    )
-    nothing = RoadLoad()
-    return DualClutch(
-        J1=INERTIAS[0], J2e=0.0, eta=1.0, loss_law="paper", i_in=1.0, J_out=INERTIAS[1], i_f=1.0,
-        J_v=1.0, k_o=1e-9, c_o=0.0, load=nothing, elements=(clutch,),
-    )  # fmt: skip
-
-
 def linearised(coefficients: FloatArray, seen: Experiment) -> tuple[FloatArray, FloatArray]:
     """Misfit of both speeds (2n,) and its exact derivatives (2n, 2) by C1 and C2."""
-    torque = Signal(seen.time[[0, -1]], np.full(2, TORQUE))
-    found = simulate_sensitivities(
-        model(coefficients),
-        torque,
-        {"C": seen.pressure},
-        State(0.0, 0.0, 0.0, 0.0),
-        seen.time,
-        NAMES,
-    )
-    run = found.run
-    misfit = np.concatenate([run.engine_speed, run.output_speed]) - seen.speeds.T.ravel()
-    slopes = [found.derivatives[name] for name in NAMES]
-    return misfit, np.column_stack(
-        [np.concatenate([each.engine_speed, each.output_speed]) for each in slopes]
-    )
+    model = build(coefficients.tolist(), seen.pressure)
+    found = model.differentiate(seen.time, UNKNOWNS, record=SPEEDS)
+    misfit = np.concatenate([found.run.columns[speed] for speed in SPEEDS]) - seen.speeds.T.ravel()
+    return misfit, np.concatenate([found.derivatives[speed] for speed in SPEEDS])
 
 
 def solve(seed: int = 0) -> Solution:

@@ -17,9 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
-from drivetwin.simulation.batch import Batch, Keep, Scenario, simulate_batch
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray
-from tests.support.upshift.scenario import build_model, build_signals, build_state
+from drivetwin.simulation.batch import Batch, Keep
+from drivetwin.simulation.driveline import SHAFT
+from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
+from tests.support.upshift.scenario import build_scenario
 from tests.support.upshift.statement import BAR, Inputs, Problem, make_inputs, make_problem, start
 
 RUNS = 1000
@@ -61,12 +63,12 @@ def draw_sets(of: Problem, runs: int = RUNS) -> FloatArray:
 def simulate_sets(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep, int]) -> Batch:
     """Simulate all sets in drivetwin; `how` is what is kept and the number of threads."""
     keep, threads = how
-    model, signals, begin = build_model(of), build_signals(given), build_state(of, given)
-    torque = signals.pop(ENGINE_TORQUE)
-    return simulate_batch(
-        model,
-        [Scenario(torque, signals, begin)],
+    nominal = build_scenario(of, given)
+    return simulate_network_batch(
+        nominal.elements,
+        [NetworkScenario(nominal.inputs, nominal.start)],
         given.time,
+        [("shaft_torque", SHAFT)],
         _name_columns(of, given, sets),
         keep=keep,
         threads=threads,
@@ -104,23 +106,23 @@ def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
 
 
 def _name_columns(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray]:
-    """Map names of drivetwin to columns; all sets start with the same torque of the shaft."""
+    """Map paths of numbers to columns; all sets start with the same torque of the shaft."""
     column = dict(enumerate(sets.T))
     laws = {
-        f"{clutch}.{field}": column[place]
+        f"{clutch}.friction.{field}": column[place]
         for clutch in ("2", "3")
         for field, place in (("mu_s", 17), ("mu_c", 18), ("v_s", 19))
     }
     return {
-        "J1": column[0] / column[3],
-        "J_v": column[2],
-        "eta": column[3],
+        "J1.inertia": column[0] / column[3],
+        "J_v.inertia": column[2],
+        "i_in.loss.eta": column[3],
         "load.constant": column[10],
-        "k_o": column[11],
-        "c_o": column[12],
+        f"{SHAFT}.stiffness": column[11],
+        f"{SHAFT}.damping": column[12],
         "2.gain": column[13] / BAR,
         "3.gain": column[14] / BAR,
-        "start.twist": start(of, given)[3] / column[11],
+        f"start.{SHAFT}": start(of, given)[3] / column[11],
         **laws,
     }
 

@@ -7,11 +7,18 @@ import numpy as np
 
 from benchmarks.speed.core import Example
 from benchmarks.speed.measure import Entry, Group, Judge, Quality, time_runs
-from drivetwin.simulation.driveline_run import simulate
+from drivetwin.simulation.driveline_run import list_motion_outputs, simulate
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Trajectory
-from drivetwin.simulation.dual_clutch_sensitivity import Sensitivities, simulate_sensitivities
+from drivetwin.simulation.network import NetworkRun
+from drivetwin.simulation.network_sensitivity import differentiate
 from tests.support.upshift.equations import Equations
-from tests.support.upshift.scenario import build_model, build_scenario, build_signals, build_state
+from tests.support.upshift.scenario import (
+    OUTPUTS,
+    build_model,
+    build_scenario,
+    build_signals,
+    build_state,
+)
 from tests.support.upshift.scipy_solution import Method, solve
 from tests.support.upshift.statement import Inputs, Problem, Solution
 
@@ -22,8 +29,10 @@ WHOLE = "in Rust, from the elements on"
 PYTHON = "called from Python, nine columns"
 _REPEATS = 20
 PARAMETERS = (
-    *("J1", "eta", "J_out", "J_v", "k_o", "c_o", "i_f", "load.constant"),
-    *("2.gain", "3.gain", "2.P0", "3.P0", "3.mu_c", "3.mu_s", "3.v_s", "3.mu_v"),
+    *("J1.inertia", "i_in.loss.eta", "J_out.inertia", "J_v.inertia"),
+    *("output shaft.stiffness", "output shaft.damping", "i_f.ratio", "load.constant"),
+    *("2.gain", "3.gain", "2.p0", "3.p0"),
+    *(f"3.friction.{field}" for field in ("mu_c", "mu_s", "v_s", "mu_v")),
 )
 """The sixteen that derivatives are taken for."""
 DERIVED = f"{len(PARAMETERS)} parameters, called from Python"
@@ -43,15 +52,18 @@ def compare_with(reference: Solution) -> Judge:
 
 def make_entries(of: Problem, given: Inputs, reference: Judge, example: Example) -> list[Entry]:
     """Return the entries: four outputs on the 1 ms grid, with default settings."""
-    path = example.store("shift", build_scenario(of, given))
+    shift = build_scenario(of, given)
+    path = example.store("shift", shift)
     model, signals, begin = build_model(of), build_signals(given), build_state(of, given)
     torque = signals.pop(ENGINE_TORQUE)
+    columns = list_motion_outputs([one.name for one in model.elements])
 
     def simulate_once() -> Trajectory:
         return simulate(model, torque, signals, begin, given.time)
 
-    def derive_once() -> Sensitivities:
-        return simulate_sensitivities(model, torque, signals, begin, given.time, PARAMETERS)
+    def derive_once() -> Solution:
+        run = (shift.elements, shift.inputs, shift.start, shift.time, columns)
+        return _collect(differentiate(*run, PARAMETERS).run)
 
     return [
         Entry(PROGRAM, READY, lambda: example.run(path, _REPEATS, "again"), reference),
@@ -66,7 +78,7 @@ def make_entries(of: Problem, given: Inputs, reference: Judge, example: Example)
         Entry(
             PROGRAM,
             DERIVED,
-            lambda: time_runs(lambda: _convert(derive_once().run), _REPEATS),
+            lambda: time_runs(derive_once, _REPEATS),
             reference,
             Group.DERIVATIVES,
         ),
@@ -76,6 +88,11 @@ def make_entries(of: Problem, given: Inputs, reference: Judge, example: Example)
 def _convert(run: Trajectory) -> Solution:
     columns = (run.engine_speed, run.output_speed, run.wheel_speed, run.shaft_torque)
     return Solution(np.array(columns), np.array([event.time for event in run.events]))
+
+
+def _collect(run: NetworkRun) -> Solution:
+    columns = np.array([run.columns[output] for output in OUTPUTS])
+    return Solution(columns, np.array([event.time for event in run.events]))
 
 
 def make_scipy_entries(of: Problem, given: Inputs, judge: Judge) -> list[Entry]:

@@ -19,7 +19,6 @@ __all__ = [
     "network_response",
     "network_sensitivities",
     "reduce_shift",
-    "sensitivities",
     "simulate_batch",
     "simulate_controlled",
     "simulate_network",
@@ -49,13 +48,6 @@ _Sets = tuple[Sequence[str], _Array]
 _Unknowns = tuple[int, Sequence[tuple[int, str, _Array]]]
 _Ends = tuple[NDArray[np.uint32], _Array, list[tuple[int, str]]]
 
-def sensitivities(
-    driveline: str,
-    outputs: Sequence[_Output],
-    scenario: _Scenario,
-    grid: _Array,
-    unknowns: _Unknowns,
-) -> tuple[_Array, list[tuple[float, str, str, float]], str, list[list[_Array]], _Array]: ...
 def linearise(
     driveline: str,
     locked: Sequence[str],

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.batch import Keep, simulate_batch, simulate_batch_sensitivities
-from drivetwin.simulation.driveline import build_driveline
+from drivetwin.simulation.batch import Keep
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element, Output, Sine, Start, build_element, simulate
 from drivetwin.simulation.network_batch import (
@@ -19,9 +18,6 @@ from drivetwin.simulation.network_batch import (
     simulate_network_batch,
 )
 from drivetwin.simulation.network_sensitivity import differentiate
-from tests.simulation.test_batch import MODEL, START
-from tests.simulation.test_batch import TIME as SHIFT_TIME
-from tests.simulation.test_batch import scenario as shift_scenario
 from tests.support.arrays import FloatArray
 
 TIME: FloatArray = np.linspace(0.0, 1.0, 1001)
@@ -148,40 +144,6 @@ def test_values_that_change_what_holds_leave_the_outputs_their_names() -> None:
         changed, start = change(elements, given.start, {"load.rolling": rolling})
         run = simulate(changed, given.inputs, start, TIME, OUTPUTS)
         np.testing.assert_array_equal(columns, [run.columns[output] for output in OUTPUTS])
-
-
-def test_a_dual_clutch_is_the_network_of_its_elements() -> None:
-    shift = shift_scenario()
-    speeds = {"engine": START.engine_speed, "output": START.output_speed}
-    speeds["wheel"] = START.wheel_speed
-    start = Start(speeds, {"output shaft": START.twist}, START.locked)
-    given = NetworkScenario(shift.inputs, start)
-    columns = {"J2e": np.linspace(0.0, 2.0, 9), "i_in": np.linspace(1.0, 1.1, 9)}
-    placed = {"J2e.inertia": columns["J2e"] * columns["i_in"] * columns["i_in"]}
-    placed["i_in.ratio"] = columns["i_in"]
-    output: Output = ("shaft_torque", "output shaft")
-    elements = build_driveline(MODEL)
-    one = simulate_batch(MODEL, [shift], SHIFT_TIME, columns)
-    other = simulate_network_batch(elements, [given], SHIFT_TIME, [output], placed)
-    np.testing.assert_array_equal(one.values, other.values)
-    by = ["i_in", "J2e", "start.twist"]
-    slopes = simulate_batch_sensitivities(MODEL, [shift], SHIFT_TIME, columns, by=by)
-    for run in (0, 8):
-        ratio, inertia = columns["i_in"][run], columns["J2e"][run]
-        same = {path: values[run : run + 1] for path, values in placed.items()}
-        found = differentiate_network_batch(
-            elements, [given], SHIFT_TIME, [output],
-            ["i_in.ratio", "J1.inertia", "start.output shaft"], same,
-        ).derivatives[0, :, 0]  # fmt: skip
-        np.testing.assert_array_equal(slopes.derivatives[run, 2, 0], found[2])
-        if inertia > 0.0:
-            also = {"J2e": {"J2e.inertia": ratio**2}}
-            also["i_in"] = {"i_in.ratio": 1.0, "J2e.inertia": 2.0 * inertia * ratio}
-            found = differentiate_network_batch(
-                elements, [given], SHIFT_TIME, [output], also, same
-            ).derivatives[0, :, 0]
-            expected = slopes.derivatives[run, 1::-1, 0]
-            np.testing.assert_allclose(expected, found, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("shaft", [False, True])

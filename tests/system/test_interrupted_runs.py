@@ -15,22 +15,23 @@ import pytest
 
 from drivetwin import _native
 from drivetwin.errors import SimulationError
-from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
-from drivetwin.simulation.batch import (
-    Keep,
-    Scenario,
-    simulate_batch,
-    simulate_batch_sensitivities,
-)
-from drivetwin.simulation.driveline import build_start
-from drivetwin.simulation.dual_clutch import (
-    Accuracy,
-    Signal,
-)
-from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
+from drivetwin.simulation.batch import Keep
+from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import Sine, Start, simulate
+from drivetwin.simulation.network_batch import to_core_scenarios
+from drivetwin.simulation.network_sensitivity import differentiate
 from drivetwin.simulation.serialize import as_json
-from tests.simulation.test_batch import MODEL, TIME, scenario, sets
+from tests.simulation.test_batch import (
+    ELEMENTS,
+    ETA,
+    MANY,
+    TIME,
+    TORQUE,
+    differentiate_batch,
+    scenario,
+    sets,
+    simulate_batch,
+)
 
 LATEST = 0.2
 """Time after a signal until which a call has ended [s]."""
@@ -73,29 +74,24 @@ def run_long_network() -> None:
 
 def run_long_batch(threads: int) -> None:
     """Simulate more parameter sets than are done in a few seconds."""
-    simulate_batch(MODEL, [scenario()], TIME, sets(200_000), keep=Keep.LAST, threads=threads)
+    simulate_batch(sets(200_000), keep=Keep.LAST, threads=threads)
 
 
 def run_long_batch_sensitivities() -> None:
     """Differentiate more runs than are done in a few seconds."""
-    simulate_batch_sensitivities(
-        MODEL, [scenario()], TIME, sets(20_000), by=["eta"], keep=Keep.LAST
-    )
+    differentiate_batch([ETA], sets(20_000), keep=Keep.LAST)
 
 
 def run_long_sensitivities() -> None:
     """Differentiate a run over a million samples of its inputs, by all parameters of two passes."""
     one, stretched = scenario(), np.linspace(0.0, 1000.0, 1_000_001)
-    torque, pressures = (
-        Signal(stretched, np.resize(one.engine_torque.values, stretched.size)),
-        {
-            name: Signal(stretched, np.resize(p.values, stretched.size))
-            for name, p in one.pressures.items()
-        },
-    )
-    by = [f"{name}.{field}" for name in ("B2", "B3") for field in ("P0", "mu_c", "mu_s", "gain")]
-    by += ["eta", "J1", "J_out", "i_f", "J_v", "k_o", "c_o", "load.constant", "start.twist"]
-    simulate_sensitivities(MODEL, torque, pressures, one.start, np.array([0.0, 1000.0]), by)
+    inputs = {
+        name: Signal(stretched, np.resize(given.values, stretched.size))
+        for name, given in one.samples.items()
+    }
+    fields = ("p0", "friction.mu_c", "friction.mu_s", "gain")
+    by = [*MANY, *(f"{name}.{field}" for name in ("B2", "B3") for field in fields)]
+    differentiate(ELEMENTS, inputs, one.start, np.array([0.0, 1000.0]), TORQUE, by)
 
 
 CALLS: dict[str, Callable[[], object]] = {
@@ -125,20 +121,11 @@ def test_a_fault_inside_the_core_is_an_error_below_exception() -> None:
     values = np.empty(3)  # room for one run too few
     with pytest.raises(SimulationError, match="the solver failed inside") as caught:
         _native.simulate_batch(
-            as_json(MODEL),
-            [to_plain(scenario())],
-            (["i_in.loss.eta"], np.full((4, 1), 0.9)),
+            as_json(ELEMENTS),
+            to_core_scenarios([scenario()]),
+            ([ETA], np.full((4, 1), 0.9)),
             TIME,
             (np.empty((0, 0)), "last"),
             (([("speed", ("engine",))], 1), values),
         )
     assert isinstance(caught.value, Exception)
-
-
-def to_plain(one: Scenario) -> Any:
-    """A scenario as the core takes it."""
-    inputs = {"engine torque": one.engine_torque, **one.pressures}
-    samples = [(name, s.time, s.values, s.delay) for name, s in inputs.items()]
-    return (samples, []), build_start(
-        MODEL, NO_ADDED_ELEMENTS, one.start, one.engine_torque, 0.0
-    ).to_core()

@@ -12,7 +12,6 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.modeling.model import Model
-from drivetwin.simulation.batch import Scenario, simulate_batch
 from drivetwin.simulation.driveline_run import simulate as simulate_dual_clutch
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
@@ -20,9 +19,9 @@ from drivetwin.simulation.dual_clutch import (
     Signal,
     State,
 )
-from drivetwin.simulation.dual_clutch_sensitivity import simulate_sensitivities
 from drivetwin.simulation.linearize import linearise
 from drivetwin.simulation.network import Sine, Start, simulate
+from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
 from tests.export.cases import paper_model
 
 LONG: list[Any] = [10**400, -(10**400), 10**5000, float("inf"), np.inf]
@@ -55,13 +54,13 @@ def run_dual_clutch(model: Any = MODEL, start: State = REST) -> None:
     simulate_dual_clutch(model, ONE, PRESSURES, start, GRID)
 
 
-def run_modelled(torque: Any = 1.0, speed: Any = 0.0, end: Any = 1.0) -> None:
-    """Build a wheel under a torque and run it."""
+def build_wheel(torque: Any = 1.0, speed: Any = 0.0) -> Model:
+    """Build a wheel under a torque."""
     model = Model("m")
     wheel = model.inertia("wheel", 2.0)
     model.torque("T", wheel, torque)
     model.start({wheel: speed})
-    model.simulate(end)
+    return model
 
 
 ENTRIES: dict[str, Callable[[Any], object]] = {
@@ -79,18 +78,16 @@ ENTRIES: dict[str, Callable[[Any], object]] = {
     "parameter": lambda value: run_dual_clutch(replace(MODEL, J1=value)),
     "load": lambda value: run_dual_clutch(replace(MODEL, load=RoadLoad(value))),
     "start of a dual clutch": lambda value: run_dual_clutch(start=replace(REST, twist=value)),
-    "derivative": lambda value: simulate_sensitivities(
-        replace(MODEL, k_o=value), ONE, PRESSURES, REST, GRID, ["J1"]
+    "derivative": lambda value: build_wheel().differentiate(1.0, {"J": {"wheel.inertia": value}}),
+    "batch": lambda value: simulate_network_batch(
+        [{"type": "inertia", "name": "J", "node": "x", "inertia": value}],
+        [NetworkScenario({}, Start({"x": 1.0}))],
+        GRID,
+        [("speed", "x")],
     ),
-    "delay of a derivative": lambda value: simulate_sensitivities(
-        MODEL, replace(ONE, delay=value), PRESSURES, REST, GRID, ["J1"]
-    ),
-    "batch": lambda value: simulate_batch(
-        replace(MODEL, eta=value), [Scenario(ONE, PRESSURES, REST)], GRID
-    ),
-    "modelled torque": lambda value: run_modelled(torque=value),
-    "modelled speed": lambda value: run_modelled(speed=value),
-    "modelled end": lambda value: run_modelled(end=value),
+    "modelled torque": lambda value: build_wheel(torque=value).simulate(1.0),
+    "modelled speed": lambda value: build_wheel(speed=value).simulate(1.0),
+    "modelled end": lambda value: build_wheel().simulate(value),
     "linear model": lambda value: linearise(replace(MODEL, J_v=value), ()),
 }
 

@@ -32,7 +32,7 @@ fn upshift() -> [Vec<f64>; 4] {
 }
 
 fn kernels(criterion: &mut Criterion) {
-    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let driveline = paper_driveline::<f64>(LossLaw::Paper);
     let network = Network::compile(&driveline).expect("a driveline");
     let [time, torque, off, on] = upshift();
     let signals = [

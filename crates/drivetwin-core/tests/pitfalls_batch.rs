@@ -51,7 +51,7 @@ fn columns_of(
 
 /// Shaft torque of the paper's shift under several sets of numbers by path, one thread.
 fn shifts_of(paths: &[&str], sets: &[f64], settings: Settings) -> Kept {
-    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let driveline = paper_driveline::<f64>(LossLaw::Paper);
     let network = Network::compile(&driveline).expect("a driveline");
     let columns = upshift(1.0);
     let signals: Vec<(&str, Signal<'_, f64>)> =
@@ -146,7 +146,7 @@ fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
     let shaft = ["output shaft.stiffness", "start.output shaft"];
     let clutches = ["B2.gain", "B3.gain", "B3.p0", "B3.friction.mu_s"];
     let paths = [&[ETA], &shaft[..1], &clutches, &shaft[1..]].concat();
-    let mut driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let mut driveline = paper_driveline::<f64>(LossLaw::Paper);
     let twist = second_gear::<f64>().twists[0].1;
     let nominal = paths.iter().map(|path| driveline.number_mut(path).map_or(twist, |n| *n));
     let nominal: Vec<f64> = nominal.collect();
@@ -193,7 +193,7 @@ fn runs_that_decide_otherwise_are_as_they_would_be_alone() {
 /// and without operators.
 #[test]
 fn jumps_between_samples_are_met_together_and_alone() {
-    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let driveline = paper_driveline::<f64>(LossLaw::Paper);
     let network = Network::compile(&driveline).expect("a driveline");
     let grid: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
     let time: Vec<f64> = [&grid[..=500], &grid[500..]].concat();
@@ -226,7 +226,7 @@ fn jumps_between_samples_are_met_together_and_alone() {
 /// none begin a block: here from sample 61 on, after the on-coming clutch has been filled.
 #[test]
 fn a_coarse_grid_is_met_at_its_points() {
-    let driveline = paper_driveline::<f64>(LossLaw::Paper).driveline();
+    let driveline = paper_driveline::<f64>(LossLaw::Paper);
     let network = Network::compile(&driveline).expect("a driveline");
     let mut columns = upshift(1.0);
     for (t, pressure) in columns[0].1.clone().iter().zip(&mut columns[2].2) {

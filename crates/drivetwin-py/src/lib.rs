@@ -16,7 +16,6 @@ mod output;
 mod plain;
 mod response;
 mod scenario;
-mod sensitivity;
 mod table;
 mod whitening;
 
@@ -29,7 +28,6 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 /// The compiled core.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(sensitivity::sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(batch::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(batch::batch_sensitivities, module)?)?;
     module.add_function(wrap_pyfunction!(controlled::simulate_controlled, module)?)?;

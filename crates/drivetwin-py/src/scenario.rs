@@ -2,7 +2,7 @@
 //! Drivelines, inputs and starts as Python names them.
 
 use crate::border::refused;
-use drivetwin_core::model::{Driveline, DualClutch, Element};
+use drivetwin_core::model::{Driveline, Element};
 use drivetwin_core::number::Number;
 use drivetwin_core::simulate::{Scenario, Seed, Start};
 use drivetwin_core::solver::Signal;
@@ -21,12 +21,8 @@ pub type NamedScenario<'py> = ((Vec<Samples<'py, f64>>, Vec<Sine>), NamedStart<f
 /// Unknown, path of a number that depends on it, derivatives for all runs or for each.
 pub type NamedSeed<'py> = (usize, String, PyReadonlyArray1<'py, f64>);
 
-/// Read a driveline from its JSON, a list of elements or a dual clutch.
+/// Read a driveline from its JSON, a list of elements.
 pub fn parse<T: Number + DeserializeOwned>(driveline: &str) -> PyResult<Driveline<T>> {
-    if driveline.starts_with('{') {
-        let model: DualClutch<T> = serde_json::from_str(driveline).map_err(|e| refused(&e))?;
-        return Ok(model.driveline());
-    }
     if let Ok(elements) = serde_json::from_str(driveline) {
         return Ok(Driveline { elements });
     }

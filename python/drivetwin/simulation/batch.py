@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Many runs of a dual-clutch driveline: parameter sets in one scenario, or many scenarios.
-
-Runs over the same samples go side by side through the vector units and over all cores. A run's
-result depends neither on its neighbours nor on the number of threads.
-"""
+"""Calls of the core for many runs, and their results."""
 
 from __future__ import annotations
 
@@ -17,24 +13,20 @@ from numpy.typing import NDArray
 from drivetwin._native import batch_sensitivities as native_batch_sensitivities
 from drivetwin._native import simulate_batch as native_simulate_batch
 from drivetwin.errors import InputError
-from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
-from drivetwin.simulation.driveline import build_start
 from drivetwin.simulation.dual_clutch import (
-    MOTION,
     CoreSamples,
     CoreStart,
-    DualClutch,
     FloatArray,
     Signal,
-    State,
-    collect_inputs,
     require_delays,
     run_time,
-    to_delayed_core_samples,
 )
-from drivetwin.simulation.dual_clutch_sensitivity import Seed, list_seeds, place_sets
 from drivetwin.simulation.network import NativeOutput
-from drivetwin.simulation.serialize import as_array, as_json, as_names
+from drivetwin.simulation.serialize import as_array
+
+Seed = tuple[int, str, FloatArray]
+"""Number of an unknown, path of a number, its derivatives by the unknown: one for all runs (1,) or
+one for each (runs,)."""
 
 
 class Keep(StrEnum):
@@ -42,20 +34,6 @@ class Keep(StrEnum):
 
     COLUMNS = "columns"  # every output on the grid
     LAST = "last"  # every output at the end
-
-
-@dataclass(frozen=True, eq=False)
-class Scenario:
-    """Inputs and start of a run; `pressures` [Pa, gauge] by element name."""
-
-    engine_torque: Signal
-    pressures: Mapping[str, Signal]
-    start: State
-
-    @property
-    def inputs(self) -> dict[str, Signal]:
-        """Inputs by their names in the core."""
-        return collect_inputs(self.engine_torque, self.pressures)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,57 +65,6 @@ class BatchSensitivities:
     derivatives: FloatArray
     last_lock: FloatArray
     grazing: Mapping[int, str]
-
-
-def simulate_batch(
-    model: DualClutch,
-    scenarios: Sequence[Scenario],
-    time: FloatArray,
-    parameters: Mapping[str, FloatArray] | None = None,
-    *,
-    outputs: Sequence[str] = ("shaft_torque",),
-    keep: Keep | Sequence[FloatArray] = Keep.COLUMNS,
-    threads: int = 0,
-) -> Batch:
-    """Simulate on `time` (n,) [s] once per set of `parameters`, or once per scenario.
-
-    `parameters` maps names as in `simulate_sensitivities` (but for delays) to their values (runs,);
-    with several scenarios there must be one for every run. Outputs are the names of
-    `dual_clutch.MOTION`, and `torque.<element>` or `slip.<element>`. Instead of what to keep, one
-    measured column (n,) per output may be given: kept is then the sum of the squared distances to
-    it, over its samples that are not NaN. `threads` 0 takes all cores.
-    Raises InputError for unknown names, differing lengths or an inconsistent description.
-    """
-    native = [parse_output(name) for name in as_names(outputs)]
-    plain = _to_core_scenarios(model, scenarios)
-    asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
-    return asked.simulate(as_json(model), place_sets(model, asked.sets), threads)
-
-
-def simulate_batch_sensitivities(
-    model: DualClutch,
-    scenarios: Sequence[Scenario],
-    time: FloatArray,
-    parameters: Mapping[str, FloatArray] | None = None,
-    *,
-    by: Sequence[str],
-    outputs: Sequence[str] = ("shaft_torque",),
-    keep: Keep | Sequence[FloatArray] = Keep.COLUMNS,
-) -> BatchSensitivities:
-    """The runs of `simulate_batch` with exact derivatives of what is kept.
-
-    `by` names what to differentiate by, at least one, as in `simulate_sensitivities` (delays
-    included); with measured columns to keep these are the gradients of the misfits. Takes all
-    cores.
-    Raises InputError as `simulate_batch`.
-    """
-    by = as_names(by)
-    require_unknowns((one.inputs for one in scenarios), by)
-    native = [parse_output(name) for name in as_names(outputs)]
-    plain = _to_core_scenarios(model, scenarios)
-    asked = BatchRequest.build(plain, time, parameters or {}, native, keep)
-    sets, (_, seeds) = place_sets(model, asked.sets), list_seeds(model, by, asked.sets)
-    return asked.differentiate(as_json(model), sets, by, seeds)
 
 
 CoreScenario = tuple[
@@ -257,25 +184,3 @@ def _count_runs(sets: Mapping[str, FloatArray], scenarios: int) -> int:
             "give every parameter as many values, and one scenario or as many",
         )
     return runs
-
-
-def parse_output(name: str) -> NativeOutput:
-    """Return an output as the core takes it. Raises InputError for an unknown name."""
-    kind, _, element = name.partition(".")
-    if element and kind in ("torque", "slip"):
-        return "friction_torque" if kind == "torque" else "slip", (element,)
-    if name not in MOTION:
-        known = ", ".join([*MOTION, "torque.<element>", "slip.<element>"])
-        raise InputError(f"output {name!r} is unknown", f"choose from {known}")
-    return MOTION[name]
-
-
-def _to_core_scenarios(model: DualClutch, scenarios: Sequence[Scenario]) -> list[CoreScenario]:
-    starts = (
-        build_start(model, NO_ADDED_ELEMENTS, one.start, one.engine_torque, 0.0)
-        for one in scenarios
-    )
-    return [
-        ((to_delayed_core_samples(one.inputs), []), start.to_core())
-        for one, start in zip(scenarios, starts, strict=True)
-    ]

@@ -33,17 +33,6 @@ the magnitude of the times, so Unix time stamps would give wrong results."""
 ENGINE_TORQUE = "engine torque"
 """Name of that input of a dual clutch; the pressures have those of their elements."""
 
-_SHAFT = "output shaft"
-
-MOTION: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "engine_speed": ("speed", ("engine",)),
-    "output_speed": ("speed", ("output",)),
-    "wheel_speed": ("speed", ("wheel",)),
-    "twist": ("twist", (_SHAFT,)),
-    "shaft_torque": ("shaft_torque", (_SHAFT,)),
-}
-"""Outputs of the motion of a dual clutch by name, as the core takes them."""
-
 CoreSamples = tuple[str, FloatArray, FloatArray, float]
 """Name of an input, times [s], values and delay [s]."""
 

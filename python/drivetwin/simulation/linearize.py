@@ -17,6 +17,7 @@ from scipy.linalg import null_space
 
 from drivetwin._native import linearise as native_linearise
 from drivetwin.errors import InputError
+from drivetwin.simulation.driveline import SHAFT, build_driveline
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
 from drivetwin.simulation.network import Element, Request, combine_columns, resolve_output
@@ -25,7 +26,7 @@ from drivetwin.simulation.serialize import as_json, as_names, require_number
 Output = tuple[str, str]
 """A quantity and the name of its node or element, such as ("shaft_torque", "output shaft")."""
 
-SHAFT_TORQUE: Output = ("shaft_torque", "output shaft")
+SHAFT_TORQUE: Output = ("shaft_torque", SHAFT)
 
 _ZERO = 1e-12
 """Relative size of numbers that are zero but for round-off."""
@@ -147,16 +148,18 @@ def linearise(
     its play; gears with loss pass power from `a` to `b`.
     Raises InputError for unknown names or an inconsistent description.
     """
-    elements = None if isinstance(driveline, DualClutch) else list(driveline)
-    if outputs is None:
-        outputs = (SHAFT_TORQUE,) if elements is None else ()
+    if isinstance(driveline, DualClutch):
+        elements = build_driveline(driveline)
+        outputs = (SHAFT_TORQUE,) if outputs is None else outputs
+    else:
+        elements, outputs = list(driveline), outputs or ()
     locked, points = as_names(locked), dict(slipping or {})
-    refuse_faults(find_element_faults(elements or ()))
+    refuse_faults(find_element_faults(elements))
     _check(locked, points)
     requests = _find_requests(outputs, elements)
     try:
         matrices, states, inputs = native_linearise(
-            as_json(driveline if elements is None else elements),
+            as_json(elements),
             locked,
             [
                 (
@@ -171,7 +174,7 @@ def linearise(
     except ValueError as error:
         raise InputError(str(error), "correct the description or the names") from error
     a, b, c, d = matrices
-    held = _collect_inactive_inputs(elements or ())
+    held = _collect_inactive_inputs(elements)
     moving = [i for i, name in enumerate(inputs) if name not in held]
     rows = combine_columns(requests, np.hstack([c, d]))
     by_all = np.reshape(rows, (len(outputs), len(states) + len(inputs)))
@@ -194,15 +197,9 @@ def _check(locked: Sequence[str], points: Mapping[str, Slip]) -> None:
         raise InputError(f"{', '.join(both)}: locked and slipping", "name it in one of them")
 
 
-def _find_requests(outputs: Sequence[Output], elements: Sequence[Element] | None) -> list[Request]:
+def _find_requests(outputs: Sequence[Output], elements: Sequence[Element]) -> list[Request]:
     """Resolve the outputs. Raises InputError for those that a linear system cannot represent."""
-    requests = [resolve_output(output, elements or ()) for output in outputs]
-    kinds = {output[0] for output in outputs if output}
-    if elements is None and "torque" in kinds:
-        raise InputError(
-            "a dual-clutch driveline has no torques at ports",
-            "ask for a friction_torque or the shaft_torque, or describe it by elements",
-        )
+    requests = [resolve_output(output, elements) for output in outputs]
     refuse_faults([one for one in requests if isinstance(one, str)])
     angles = [name for kind, name in outputs if kind == "angle"]
     if angles:

@@ -37,7 +37,7 @@ from drivetwin.simulation.network import (
     resolve_outputs,
     to_core_sines,
 )
-from drivetwin.simulation.serialize import as_json, as_names, is_number
+from drivetwin.simulation.serialize import as_json, as_names, is_number, require_number
 from drivetwin.simulation.variable import Variable, iterate_variables, seed, seed_description
 
 LANES = _LANES
@@ -221,7 +221,8 @@ def collect_weights(unknowns: Unknowns) -> dict[str, FloatArray]:
     slopes: dict[str, FloatArray] = {}
     for place, weights in enumerate(named.values()):
         for path, weight in weights.items():
-            slopes.setdefault(path, np.zeros(len(named)))[place] += weight
+            column = slopes.setdefault(path, np.zeros(len(named)))
+            column[place] += require_number(f"weight of {path!r}", weight)
     return slopes
 
 

@@ -7,7 +7,6 @@
 pub mod converter_map;
 mod declare;
 mod described;
-pub mod dual_clutch;
 pub mod elements;
 mod error;
 pub mod field;
@@ -18,7 +17,6 @@ pub mod schema;
 pub mod torque_map;
 
 pub use described::Described;
-pub use dual_clutch::DualClutch;
 pub use elements::{Element, element_schema};
 pub use error::{ModelError, ModelFaults};
 pub use friction::{FrictionLaw, FrictionTable, Stribeck};

@@ -3,11 +3,8 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-use drivetwin_core::model::dual_clutch::{
-    DualClutch, ENGINE, Load, OUTPUT, SHAFT, ShiftElement, WHEEL,
-};
 use drivetwin_core::model::elements::{
-    Clutch, Element, Gear, Inertia, RoadLoad, SpringDamper, Torque,
+    Clutch, Element, Gear, GearLoss, Inertia, RoadLoad, SpringDamper, Torque,
 };
 use drivetwin_core::model::mechanism::LossLaw;
 use drivetwin_core::model::{Driveline, FrictionLaw, Stribeck};
@@ -112,37 +109,69 @@ pub fn constant(name: &'static str, value: f64, end: f64) -> Signal {
     (name, vec![0.0, end], vec![value, value])
 }
 
+/// Nodes and shaft of the driveline of the paper.
+const ENGINE: &str = "engine";
+const OUTPUT: &str = "output";
+const WHEEL: &str = "wheel";
+const SHAFT: &str = "output shaft";
+
 /// The driveline of the paper with the numbers of PARAMETERS section 4.
-pub fn paper_driveline<T: Real>(law: LossLaw) -> DualClutch<T> {
-    let of = T::of;
-    let mu = || {
-        let (mu_c, mu_s, v_s, mu_v) = (of(0.110), of(0.135), of(15.0), of(1e-4));
-        FrictionLaw::Stribeck(Stribeck { mu_c, mu_s, v_s, mu_v })
-    };
-    let element = |name: &str, i: f64, gain: f64| ShiftElement {
+pub fn paper_driveline<T: Real>(law: LossLaw) -> Driveline<T> {
+    let plain = |name: &str, a: &str, b: &str, ratio: f64| Gear {
         name: name.into(),
-        i_c: of(i - 1.0),
-        i_out: of(i / (i - 1.0)),
-        gain: of(gain),
-        p0: of(0.8e5),
-        friction: mu(),
-        peak: of(1.0),
-        drum_inertia: of(0.0),
+        a: a.into(),
+        b: b.into(),
+        ratio,
+        loss: None,
+        losses: None,
     };
-    DualClutch {
-        J1: of(20.3),
-        J2e: of(0.0),
-        eta: of(0.85),
-        loss_law: law,
-        i_in: of(1.0),
-        J_out: of(0.9),
-        i_f: of(5.38),
-        J_v: of(6056.0),
-        k_o: of(1.76e5),
-        c_o: of(280.0),
-        load: Load { constant: of(2300.0 * 5.38), rolling: of(0.0), aero: of(0.0) },
-        elements: vec![element("B2", 1.91, 3.78e-2), element("B3", 1.43, 2.7e-2)],
-    }
+    let mass = |name: &str, node: &str, inertia: f64| {
+        Element::Inertia(Inertia { name: name.into(), node: node.into(), inertia })
+    };
+    let path = |name: &str, ratio: f64, gain: f64| {
+        let (a, b) = (format!("{name} input side"), format!("{name} output side"));
+        let friction = Stribeck { mu_c: 0.110, mu_s: 0.135, v_s: 15.0, mu_v: 1e-4 };
+        let element = Clutch {
+            friction: FrictionLaw::Stribeck(friction),
+            gain,
+            p0: 0.8e5,
+            pressure: name.into(),
+            ..clutch(name, &a, &b)
+        };
+        [
+            Element::Gear(plain(&format!("i_c {name}"), "input gear", &a, ratio - 1.0)),
+            Element::Clutch(element),
+            Element::Gear(plain(&format!("i_out {name}"), &b, OUTPUT, ratio / (ratio - 1.0))),
+        ]
+    };
+    let loss = Some(GearLoss::by_efficiency(law, 0.85));
+    let output_shaft = SpringDamper {
+        name: SHAFT.into(),
+        a: OUTPUT.into(),
+        b: "axle".into(),
+        stiffness: 1.76e5,
+        damping: 280.0,
+    };
+    let resistance = RoadLoad {
+        name: "load".into(),
+        node: WHEEL.into(),
+        constant: 2300.0 * 5.38,
+        rolling: 0.0,
+        aero: 0.0,
+    };
+    let mut elements = vec![
+        mass("J1", ENGINE, 20.3),
+        torque(ENGINE, "engine torque"),
+        Element::Gear(Gear { loss, ..plain("i_in", ENGINE, "input gear", 1.0) }),
+        mass("J_out", OUTPUT, 0.9),
+        Element::SpringDamper(output_shaft),
+        Element::Gear(plain("i_f", "axle", WHEEL, 5.38)),
+        mass("J_v", WHEEL, 6056.0),
+    ];
+    elements.extend(path("B2", 1.91, 3.78e-2));
+    elements.extend(path("B3", 1.43, 2.7e-2));
+    elements.push(Element::RoadLoad(resistance));
+    Driveline { elements }.promote()
 }
 
 /// Speeds of engine, output and wheel, twist and torque of the output shaft.
