@@ -45,7 +45,7 @@ def test_commands_alone_are_refused_by_their_cause(name: str, mapped: bool, tmp_
 
 
 def make_pressure(values: FloatArray, step: float) -> Channel:
-    time = step * np.arange(values.size)
+    time = np.arange(values.size) * np.float64(step)
     return Channel(make_pressure_role("B3"), Quantity.PRESSURE, time, values, "PrsBrk3", "Pa")
 
 

@@ -213,9 +213,10 @@ def test_a_coarse_table_that_shows_messages_on_is_told(step: float, own: float, 
 def test_pauses_at_even_distances_are_no_raster(late: int) -> None:
     """Windows of 4 s around shifts, 30 s apart: a slow signal has changed when the next begins."""
     rng = np.random.default_rng(1)
-    time = (30.0 * np.arange(20)[:, None] + 0.02 * np.arange(200)).ravel()
+    time = np.array([30.0 * k + 0.02 * j for k in range(20) for j in range(200)])
     window = np.arange(20).repeat(200)
     window[np.arange(4000) % 200 < late * (rng.random(20) < 0.2).repeat(200)] -= 1
-    log = Channel("temperature.oil", Quantity.TEMPERATURE, time, 28.0 + 3.0 * window, "T_oil", "C")
+    values = np.asarray(28.0 + 3.0 * window, dtype=np.float64)
+    log = Channel("temperature.oil", Quantity.TEMPERATURE, time, values, "T_oil", "C")
     assert log.raster is None
     assert log.fresh.values.size == 4000

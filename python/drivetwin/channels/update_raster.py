@@ -73,7 +73,7 @@ def _shows_updates(time: FloatArray, values: FloatArray) -> bool:
     A change after a pause came at any time within it: pauses at even distances are no raster.
     """
     changes = np.count_nonzero(values[1:] != values[:-1])
-    return 2 * np.count_nonzero(_find_changes(time, values)) >= changes
+    return bool(2 * np.count_nonzero(_find_changes(time, values)) >= changes)
 
 
 def _find_changes(time: FloatArray, values: FloatArray) -> NDArray[np.bool_]:

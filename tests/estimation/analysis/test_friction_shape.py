@@ -14,9 +14,8 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.analysis.friction_shape import BENDS, fit_friction_shape, project_shape
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
-from drivetwin.estimation.identification import FrictionCurve
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.result.estimate import Z95
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.asked import by_the_paper, stepped
