@@ -67,7 +67,7 @@ def test_equal_content_is_one_log_and_every_file_is_named(tmp_path: Path) -> Non
 def test_what_hangs_eats_or_kills_is_quarantined_with_its_reason(tmp_path: Path) -> None:
     spoilt = ["hang", "eat", "die"]
     logs, store = make_logs(tmp_path / "logs", 8, spoilt=spoilt), tmp_path / "store"
-    summary, events = run_toys(logs, store, time_limit=2.0, attempts=2, workers=2)
+    summary, events = run_toys(logs, store, time_limit=5.0, attempts=2, workers=2)
     assert (summary.done, summary.quarantined) == (5, 3)
     assert summary.failures == {"TimeLimit": 1, "MemoryLimit": 1, "WorkerLost": 1}
     for number, error in enumerate(("TimeLimit", "MemoryLimit", "WorkerLost")):

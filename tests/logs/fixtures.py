@@ -49,8 +49,8 @@ def columns() -> dict[str, FloatArray]:
     return {
         "time": time,
         "EngTrq": np.full(200, 1500.0),
-        "PrsBrk2": 14.0 * np.clip((0.85 - time) / 0.05, 0.0, 1.0),
-        "PrsBrk3": 14.0 * np.clip((time - 0.65) / 0.05, 0.0, 1.0),
+        "PrsBrk2": 14.0 / (1.0 + np.exp((time - 0.8) / 0.02)),
+        "PrsBrk3": 14.0 / (1.0 + np.exp((0.7 - time) / 0.02)),
         "TrqOut": 2500.0 - 500.0 * share,
         "SpdIn": output * (1.8 - 0.4 * share),
         "SpdOut": output,

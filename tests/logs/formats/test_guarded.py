@@ -125,7 +125,6 @@ def test_a_file_that_crashes_the_library_is_a_typed_error(crashing: Path) -> Non
     for read in (read_raw, lambda path: read_log(path, None)):
         with pytest.raises(FileFormatError, match=ENDED) as caught:
             read(crashing)
-        assert isinstance(caught.value, ReaderFailureError)
         assert caught.value.where.file == str(crashing)
         assert "export the log again" in caught.value.remedy
 
