@@ -22,9 +22,9 @@ from drivetwin.drive import (
     plan_launch,
     run,
 )
-from drivetwin.drive.dogs import ENGAGED, compute_synchronised_inertia, split_gear
+from drivetwin.drive.dogs import ENGAGED, split_gear
 from drivetwin.drive.plan import list_forward_gears
-from drivetwin.errors import CardError, InputError, SimulationError
+from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, build_network_elements, load_gearbox, solve_gear
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output, Start, build_element, simulate
@@ -101,24 +101,6 @@ def test_the_clutch_takes_what_the_engine_loses_in_a_launch(box: Gearbox, driven
     speed = driven.engine_speed[span]
     gained = np.trapezoid(net, driven.time[span]) / inertia
     assert gained == pytest.approx(speed[-1] - speed[0], abs=0.1)
-
-
-def test_the_synchroniser_of_second_gear_turns_shaft_and_wheels() -> None:
-    """Input shaft, fixed wheels and all loose wheels, seen at wheel 2 (36:17)."""
-    box = load_gearbox("manual-6")
-    pairs = {pair.b: pair.ratio for pair in box.pairs if pair.a == "input shaft"}
-    of_shaft = box.inertias["input shaft"] + sum(
-        box.inertias[wheel] / ratio**2 for wheel, ratio in pairs.items()
-    )
-    expected = of_shaft * pairs["wheel 2"] ** 2
-    assert compute_synchronised_inertia(box, "D2", ()) == pytest.approx(expected, rel=1e-12)
-    assert compute_synchronised_inertia(box, "D2", ("D1",)) == 0.0
-
-
-def test_a_member_without_inertia_cannot_be_synchronised() -> None:
-    bare = replace(load_gearbox("manual-6"), inertias={})
-    with pytest.raises(CardError, match="has no inertia"):
-        compute_synchronised_inertia(bare, "D2", ())
 
 
 def test_a_dog_is_not_engaged_with_slip() -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
-import struct
 import time
 from pathlib import Path
 
@@ -88,22 +87,3 @@ def test_without_zig_the_extra_is_named(source: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(compiler, "find_spec", lambda _: None)
     with pytest.raises(MissingExtraError, match=r"drivetwin\[fmu\]"):
         compile_library([source], source.with_name("one.dll"), Platform.WINDOWS)
-
-
-def test_times_in_a_windows_library_are_cleared(tmp_path: Path) -> None:
-    """A library of one section, with its export directory at address 0x1010."""
-    library = tmp_path / "one.dll"
-    header, optional, length = 0x80, 0x98, 240
-    data = bytearray(0x400)
-    struct.pack_into("<I", data, 0x3C, header)
-    struct.pack_into("<4sHHI", data, header, b"PE\0\0", 0x8664, 1, 0x66554433)
-    struct.pack_into("<H", data, header + 20, length)
-    struct.pack_into("<II", data, optional + 112, 0x1010, 40)
-    struct.pack_into("<8sIIII", data, optional + length, b".edata", 0x200, 0x1000, 0x200, 0x200)
-    struct.pack_into("<II", data, 0x210, 7, 0x66554433)
-    library.write_bytes(bytes(data))
-    compiler._clear_times(library)
-    cleared = library.read_bytes()
-    assert struct.unpack_from("<I", cleared, header + 8) == (0,)
-    assert struct.unpack_from("<II", cleared, 0x210) == (7, 0)
-    assert sum(a != b for a, b in zip(cleared, data, strict=True)) == 8

@@ -29,35 +29,11 @@ from tests.export.fmu.test_build import Instance
 from tests.export.modelica.compiled import run as run_modelica
 from tests.export.parameters.sample import twin
 from tests.support.arrays import FloatArray
-from tests.support.repeats import mark_repeats
 
 OLD_TORQUE = InputDelays(0.0213, 0.0, as_logged=True, held=0.01)
 EARLY_PRESSURE = InputDelays(0.004, -0.0092, as_logged=True)
 LATE_PRESSURE = InputDelays(-0.003, 0.0452, as_logged=True)
 ALL = (OLD_TORQUE, EARLY_PRESSURE, LATE_PRESSURE)
-
-
-@pytest.mark.parametrize(
-    ("delays", "lag", "torque", "pressure"),
-    [
-        (OLD_TORQUE, 0.0263, 0.0, 0.0263),
-        (EARLY_PRESSURE, 0.0092, 0.0052, 0.0),
-        (LATE_PRESSURE, 0.0, 0.003, 0.0452),
-        (InputDelays(0.0213, 0.005), 0.0, 0.0, 0.0),
-        (InputDelays(as_logged=True), 0.0, 0.0, 0.0),
-    ],
-)
-def test_the_model_waits_for_the_latest_input(
-    delays: InputDelays, lag: float, torque: float, pressure: float
-) -> None:
-    """Behind the lines every input belongs to the instant `lag` ago, and none is advanced."""
-    assert (delays.lag, delays.torque_line, delays.pressure_line) == pytest.approx(
-        (lag, torque, pressure)
-    )
-    if delays.as_logged:
-        age = delays.torque + 0.5 * delays.held
-        assert age + delays.torque_line == pytest.approx(delays.lag)
-        assert -delays.pressure + delays.pressure_line == pytest.approx(delays.lag)
 
 
 def test_every_form_describes_the_delays_inside() -> None:
@@ -108,20 +84,6 @@ def test_c_delays_its_inputs(delays: InputDelays) -> None:
         assert run.status == "completed"
         deviation = np.abs(run.columns["output_torque"] - np.interp(time, fine, expected)).max()
         assert deviation < tolerance * scale, time.size
-
-
-@pytest.mark.parametrize("delays", mark_repeats(ALL, ALL[-1:]))
-@pytest.mark.parametrize("kind", InputKind)
-def test_c_and_core_have_the_same_delay_lines(delays: InputDelays, kind: InputKind) -> None:
-    case = _swing("tie_up")
-    subject = case.subject
-    model = CModel(replace(subject, delays=delays))
-    run = model.run(case.time, case.inputs, hold=kind is InputKind.HOLD)
-    core = run_core(subject.model, subject.start, case.time, case.inputs, kind, delays)
-    deviation = np.abs(run.columns["output_torque"] - core.shaft_torque).max()
-    assert deviation < 1e-9 * np.abs(core.shaft_torque).max()
-    plain = run_core(subject.model, subject.start, case.time, case.inputs, kind)
-    assert np.abs(plain.shaft_torque - core.shaft_torque).max() > 1.0
 
 
 def test_modelica_delays_its_inputs(tmp_path: Path) -> None:

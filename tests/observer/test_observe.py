@@ -14,7 +14,7 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import TORQU
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.observer.observe import estimate_torques
 from drivetwin.observer.result import Band
-from drivetwin.parameters import OVER_ETA, get_parameter_spec
+from drivetwin.parameters import get_parameter_spec
 from tests.observer.conftest import Bench, brief
 from tests.support.arrays import FloatArray
 
@@ -79,14 +79,6 @@ def test_without_pressures_the_bands_widen_and_hold(bench: Bench) -> None:
     assert one.notes[0].startswith("no pressure of B2 and B3:")
 
 
-def test_a_single_pressure_is_not_used_and_the_missing_one_is_named(bench: Bench) -> None:
-    """The split of the torque between the elements needs both."""
-    single = estimate_torques(bench.twin, _without(bench.log, "pressure.B2"), bench.shift)
-    none = estimate_torques(bench.twin, _without(bench.log, "pressure."), bench.shift)
-    assert single.notes[0].startswith("no pressure of B2:")
-    assert np.array_equal(single.output_torque.value, none.output_torque.value)
-
-
 def test_a_twin_without_scale_is_refused(bench: Bench) -> None:
     """A twin from a log without output torque has ratios over η only."""
     told = {}
@@ -94,7 +86,7 @@ def test_a_twin_without_scale_is_refused(bench: Bench) -> None:
         told[name] = one
         if get_parameter_spec(name).stem in ("eta", *TORQUE_LIKE):
             told[name] = replace(one, value=None, std_noise=None, verdict=Verdict.NOT_IDENTIFIABLE)
-            told[name + OVER_ETA] = replace(one, id=name + OVER_ETA)
+            told[name + "_over_eta"] = replace(one, id=name + "_over_eta")
     twin = replace(bench.twin, parameters=told)
     assert twin.over_eta
     with pytest.raises(MissingParameterError, match="over η only"):
@@ -121,12 +113,3 @@ def test_a_gear_counts_as_far_as_its_torque_was_recorded(bench: Bench) -> None:
     assert end - 0.5 < one.time[0] < end - 0.4
     assert "used only from there on" in one.notes[0]
     assert _deviates(one.output_torque, bench.truth(one)["output_torque"]) < 2.0
-
-
-def test_of_a_long_gear_what_is_near_the_shift_is_told(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("drivetwin.observer.observe.FAR", 0.4)
-    one = estimate_torques(bench.twin, bench.log, bench.shift)
-    assert one.time[0] == pytest.approx(bench.shift.before[1] - 0.4, abs=0.01)
-    assert one.time[-1] == pytest.approx(bench.shift.lockup_time + 0.4, abs=0.01)

@@ -173,14 +173,6 @@ def test_torque_phase_from_output_torque_without_pressures() -> None:
     assert any("output torque" in warning for warning in render(shift.findings))
 
 
-def test_torque_phase_unknown_is_said_with_a_wide_sigma() -> None:
-    log = _without(_UP.log(), "pressure.B2", "pressure.B3", "output_torque")
-    (shift,), _ = detect_shifts(log, _UP.card())
-    assert shift.torque_phase[0] == shift.torque_phase[1] == shift.inertia_phase[0]
-    assert shift.sigma["torque_start"] >= ShiftSettings().unknown_torque_phase
-    assert any("torque phase set empty" in warning for warning in render(shift.findings))
-
-
 def test_oncoming_element_that_takes_hold_after_break_away() -> None:
     log = _UP.log()
     late = log["pressure.B3"]
@@ -293,11 +285,6 @@ def test_refused_pressure_below_P0() -> None:
     text = _refused(replace(log, channels={**log.channels, "pressure.B3": low}), _CARD)
     assert "pressures contradict the speeds: B3 locks, but" in text
     assert "bar then, below P0 = 0.8 bar" in text
-
-
-def test_refused_slip_without_change_of_gear() -> None:
-    plan = Plan(gears=(("2", 1.91), ("3", 1.7), ("2", 1.91)), break_aways=(1.5, 1.75), duration=0.3)
-    assert "held again" in _refused(plan.log(), {"2": 1.91, "4": 1.0})
 
 
 def test_refused_long_neutral() -> None:

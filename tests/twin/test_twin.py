@@ -136,14 +136,6 @@ def test_a_twin_is_made_with_the_efficiency_from_design_in_friction_and_load() -
     assert made.build_dual_clutch(SHIFT).elements[1].friction == one.stribeck
 
 
-def test_locked_ratios_are_those_of_the_gears(twin: Twin) -> None:
-    offgoing, oncoming = twin.build_dual_clutch(SHIFT).elements
-    assert (offgoing.name, oncoming.name) == ("B2", "B3")
-    assert offgoing.i_c * offgoing.i_out == pytest.approx(1.91)
-    assert oncoming.i_c * oncoming.i_out == pytest.approx(1.43)
-    assert oncoming.drum_inertia == 0.05
-
-
 def test_element_without_a_curve_runs_on_its_partners_and_says_so(twin: Twin) -> None:
     offgoing, oncoming = twin.build_dual_clutch(SHIFT).elements
     assert offgoing.friction == oncoming.friction == STRIBECK
@@ -184,11 +176,6 @@ def test_an_override_without_effect_is_refused_with_those_that_act(twin: Twin, n
     assert "J_prime_2, J_prime_3, P0.B2, P0.B3, drum.B2, drum.B3" in caught.value.remedy
 
 
-def test_one_inertia_of_a_shift_may_be_overridden(twin: Twin) -> None:
-    with pytest.raises(InputError, match="one of J_prime_2 and J_prime_3"):
-        twin.build_dual_clutch(SHIFT, overrides={"J_prime_2": 17.0, "J_prime_3": 18.0})
-
-
 def test_missing_parameter_is_named_with_its_reason(twin: Twin) -> None:
     told = dict(twin.parameters)
     told["k_o"] = replace(told["te_delay"], id="k_o", reason="no oscillation after lock-up")
@@ -200,13 +187,6 @@ def test_missing_parameter_is_named_with_its_reason(twin: Twin) -> None:
     assert "eta (not part of the identification)" in str(caught.value)
     model = partial.build_dual_clutch(SHIFT, overrides={"k_o": 1.8e5, "eta": 0.9})
     assert (model.k_o, model.eta) == (1.8e5, 0.9)
-
-
-def test_covariance_is_total(twin: Twin) -> None:
-    assert twin.covariance is not None
-    stds = [twin.parameters[name].std_total for name in twin.covariance_ids]
-    assert np.sqrt(np.diag(twin.covariance)) == pytest.approx(stds)
-    assert twin.covariance[0, 1] == pytest.approx(0.6 * (stds[0] or 0.0) * (stds[1] or 0.0))
 
 
 def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_path: Path) -> None:

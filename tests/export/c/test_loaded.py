@@ -226,18 +226,6 @@ def braked(loaded: CModel, law: Stribeck, normal: float, left: float) -> float:
     return float(run.columns["engine_speed"][-1])
 
 
-@pytest.mark.parametrize("decays", [30.0, 34.0, 80.0, 4000.0])
-def test_one_long_step_meets_the_stiction_that_starts_below_any_tolerance(
-    loaded: CModel, loaded_float: CModel, decays: float
-) -> None:
-    """Over the step the exponential of the friction law grows from exp(-decays) to 0.4."""
-    law = Stribeck(0.1, 0.5, BRAKED_SPEED / decays, 0.0)
-    left = 0.9 * law.v_s
-    assert braked(loaded, law, 100.0, left) == pytest.approx(left, abs=1e-9 * BRAKED_SPEED)
-    # Rounding is a time: what it shifts grows with the deceleration at the end over the mean one.
-    assert braked(loaded_float, law, 100.0, left) == pytest.approx(left, abs=1e-5 * BRAKED_SPEED)
-
-
 @given(
     st.floats(5.0, 300.0),
     st.floats(0.1, 40.0),
@@ -346,14 +334,6 @@ def assert_goes_on_as_the_core(run: Steps, other: DualClutch, row: FloatArray) -
     assert np.all(np.abs(seen - expected[: len(seen)]) < 1e-7 * scale)
 
 
-def test_drag_set_after_the_wheel_has_turned_round_opposes_its_motion(loaded: CModel) -> None:
-    model, row = replace(paper_model(), load=RoadLoad(-1e5)), np.zeros(3)
-    run = Steps(loaded, model, State(100.0, 0.0, -0.05, 0.0), row)
-    while run.outputs.wheel_speed < 0.5:
-        assert run.step(1e-2) == "completed"
-    assert_goes_on_as_the_core(run, replace(model, load=RoadLoad(-1e5, 0.0, 1e4)), row)
-
-
 def mixed(model: DualClutch, other: DualClutch, rng: np.random.Generator) -> DualClutch:
     """Some parameters of another driveline, and pressures at which the elements just carry."""
     pairs = zip(model.elements, other.elements, strict=True)
@@ -383,24 +363,6 @@ def pressed_for(loaded: CModel, locked: tuple[str, ...] = ()) -> Steps:
     return run
 
 
-@pytest.mark.parametrize("other", [{"P0": 4e5}, {"gain": 0.0}])
-def test_a_slipping_clutch_whose_capacity_is_taken_away_opens(
-    loaded: CModel, other: dict[str, float]
-) -> None:
-    run = pressed_for(loaded)
-    assert run.outputs.clutch_torque[1] > 500.0
-    carrying = [run.outputs.clutch_torque[1]]
-    clutch = loaded.params.clutch[1]
-    given_before = {name: getattr(clutch, name) for name in other}
-    for values in (other, given_before):
-        for name, value in values.items():
-            setattr(clutch, name, value)
-        assert run.step(1e-2) == "completed"
-        carrying.append(run.outputs.clutch_torque[1])
-    assert carrying[1] == 0.0
-    assert carrying[2] == pytest.approx(carrying[0], rel=0.05)
-
-
 def test_a_locked_clutch_that_other_parameters_overload_or_part_slips_at_once(
     loaded: CModel,
 ) -> None:
@@ -416,14 +378,6 @@ def test_a_locked_clutch_that_other_parameters_overload_or_part_slips_at_once(
     assert y.mode[0] != STUCK
     assert y.slip[0] == pytest.approx(y.engine_speed - clutch.i_out * y.output_speed, rel=1e-9)
     assert y.slip[0] < -1.0
-
-
-def test_parameters_out_of_range_are_refused_between_steps_too(loaded: CModel) -> None:
-    run = pressed_for(loaded)
-    loaded.params.clutch[0].friction.points = 1000
-    before = bytes(run.state)
-    assert run.step() == "bad parameter"
-    assert bytes(run.state) == before
 
 
 def test_what_is_out_of_range_is_refused_by_name(loaded: CModel) -> None:

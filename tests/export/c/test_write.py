@@ -127,12 +127,6 @@ def test_runner_tells_a_row_that_it_cannot_take(
     assert len(done.stdout.splitlines()) == 2
 
 
-def test_the_same_twin_gives_the_same_files(tmp_path: Path) -> None:
-    first, second = (write_c(paper_subject(), tmp_path / name) for name in ("a", "b"))
-    assert [p.name for p in first] == [p.name for p in second]
-    assert all(a.read_bytes() == b.read_bytes() for a, b in zip(first, second, strict=True))
-
-
 @pytest.mark.parametrize(("index", "stated"), [(1, 273150), (0, 145750)])
 def test_the_stated_bound_of_operations_follows_from_the_limits_of_the_loops(
     index: int, stated: int, tmp_path: Path

@@ -224,23 +224,6 @@ def test_a_clutch_opens_where_its_touch_point_is_tuned_above_its_pressure(
     assert instance.get(ONCOMING_TORQUE) == pytest.approx([carried], rel=0.05)
 
 
-def test_an_instance_goes_on_after_a_sample_beyond_any_vehicle(instance: Instance) -> None:
-    inputs = [1500.0, 0.0, 3e5]
-    instance.initialize(np.array(inputs))
-    instance.fmu.doStep(0.0, 0.01)
-    instance.set(INPUTS, [1e308, 0.0, 3e5])
-    with pytest.raises(FMICallException):
-        instance.fmu.doStep(0.01, 0.01)
-    instance.set(INPUTS, inputs)
-    instance.fmu.doStep(0.01, 0.01)
-    told = instance.get(SPEED, TORQUE)
-    instance.fmu.reset()
-    instance.initialize(np.array(inputs))
-    for k in range(2):
-        instance.fmu.doStep(0.01 * k, 0.01)
-    assert instance.get(SPEED, TORQUE) == told
-
-
 @pytest.mark.parametrize(
     ("reference", "value", "told"),
     [
@@ -261,13 +244,6 @@ def test_bad_values_are_errors_with_a_message(
     assert any(told in message for message in instance.messages)
 
 
-def test_a_locked_element_that_is_none_is_refused(instance: Instance) -> None:
-    setter = instance.fmu.setInteger if instance.is_fmi2 else instance.fmu.setInt32
-    with pytest.raises(FMICallException):
-        setter([instance.references["start.locked"]], [7])
-    assert any("not a value of this variable" in message for message in instance.messages)
-
-
 def test_calls_out_of_order_are_errors_and_no_crash(built: Built, instance: Instance) -> None:
     case, fmu = built.case, instance.fmu
     with pytest.raises(FMICallException):
@@ -285,21 +261,6 @@ def test_calls_out_of_order_are_errors_and_no_crash(built: Built, instance: Inst
     assert instance.get(TORQUE) == pytest.approx([case.reference[0]], rel=1e-9)
     get = fmu.getInteger if instance.is_fmi2 else fmu.getInt64
     assert list(get([instance.references[f"{name}.mode"] for name in ("B2", "B3")])) == [1, 0]
-
-
-def test_a_long_step_is_many_short_ones(built: Built, instance: Instance) -> None:
-    """A held input over 0.2 s, in one step and in two hundred."""
-    case, fmu = built.case, instance.fmu
-    instance.initialize(case.inputs[0])
-    instance.set(INPUTS, [900.0, 0.0, 5e5])
-    saved = fmu.getFMUState()
-    fmu.doStep(0.0, 0.2)
-    long = instance.get(SPEED, TORQUE)
-    fmu.setFMUState(saved)
-    for i in range(200):
-        fmu.doStep(i * 1e-3, 1e-3)
-    assert instance.get(SPEED, TORQUE) == pytest.approx(long, rel=1e-9)
-    fmu.freeFMUState(saved)
 
 
 def test_the_parameter_set_inside_names_what_can_be_tuned(built: Built, tmp_path: Path) -> None:

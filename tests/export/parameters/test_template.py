@@ -129,13 +129,6 @@ def test_a_value_for_what_was_not_identified_is_converted() -> None:
     assert apply_template(own, template, ["te_delay"]).entries == ()
 
 
-def test_others_are_kept_if_asked_for(template: Template) -> None:
-    own = collect_parameters(twin())
-    content = apply_template(own, replace(template, keep_others=True))
-    assert len(content.entries) == len(own.entries)
-    assert restore_entries(content, own, template).entries == own.entries
-
-
 LABEL = 'label = "a"\n'
 WRONG = {
     "no such parameter; did you mean 'eta'": ("etta", LABEL),
@@ -155,13 +148,6 @@ def test_what_does_not_fit_is_named(says: str) -> None:
     with pytest.raises(InputError, match=says) as refused:
         apply_template(collect_parameters(twin()), make_template(**{name: body}))
     assert refused.value.where.key == f"parameters.{name}"
-
-
-def test_all_faults_are_listed() -> None:
-    template = make_template(**dict(WRONG.values()))
-    with pytest.raises(InputError) as refused:
-        apply_template(collect_parameters(twin()), template)
-    assert f"{len(template.entries)} faults" in str(refused.value)
 
 
 @pytest.mark.parametrize(
