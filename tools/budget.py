@@ -25,7 +25,6 @@ PLAIN = (0, 1, 2)
 """Literals in function bodies that are no constants; -1 is the sign and 1."""
 LANGUAGES = {"toml": (".toml",), "javascript": (".js",), "c": (".c", ".h"), "rust": (".rs",)}
 VENDORED = "export/fmu/headers"  # of the FMI standard
-
 Numbers = dict[str, int]
 """Numbers by dotted key, as `statements.logs`."""
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from tools.budget import check_budget
 from tools.tidy_rules import core, files, imports, prose, texts, units, words
 from tools.tidy_rules.base import Fault, Rule, Tree, read_tree
 
 RULES: tuple[Rule, ...] = (
+    check_budget,
     core.check_purity,
     core.check_layers,
     core.check_circles,
