@@ -50,6 +50,19 @@ def make_pressure(values: FloatArray, step: float) -> Channel:
 
 
 @pytest.mark.parametrize("step", [0.001, 0.01, 0.02])
+@pytest.mark.parametrize("code", [5e3, 1.6e4, 1e5])
+@pytest.mark.parametrize("fill", [1e5, 5e5, 1e7])
+def test_a_rounded_ramp_does_not_step(step: float, code: float, fill: float) -> None:
+    """A pressure that rises by `fill` a second to 8 bar, in codes of up to an eighth of that.
+
+    16 kPa is the code of a clutch pressure in J1939.
+    """
+    time = np.arange(0.0, 12.0, step)
+    values = np.clip((time - 1.0) * fill, 0.0, 8e5)
+    assert find_command_step(make_pressure(np.round(values / code) * code, step)) is None
+
+
+@pytest.mark.parametrize("step", [0.001, 0.01, 0.02])
 def test_a_measured_pressure_does_not_step(step: float) -> None:
     """The steps of a valve with a lag of 15 ms, rounded to 50 mbar."""
     time = np.arange(0.0, 6.0, step)

@@ -19,6 +19,12 @@ _STEP = 0.05
 bits makes steps of 0.004."""
 _FLAT = 0.01
 """Largest change beside a step, over the step. A pressure settles for several samples."""
+_CODES = 2.5
+"""Least step of a command, over the smallest change of the channel. A rounded pressure moves by one
+code at a time."""
+_COARSEST = 0.2
+"""Largest smallest change that is taken for rounding, over the range of the channel. No sensor has
+five codes; commands have few levels."""
 _RESTS = 0.5
 """Least share of samples that repeat the one before: a measured pressure has noise."""
 _SLOWEST = 0.05
@@ -40,13 +46,13 @@ def find_command_step(channel: Channel) -> tuple[float, float, float] | None:
     fresh = channel.updates
     known = np.isfinite(fresh.values)
     time, values = fresh.time[known], fresh.values[known]
-    if time.size < _FEWEST or float(np.median(np.diff(time))) > _SLOWEST:
+    if time.size < _FEWEST or np.median(np.diff(time)) > _SLOWEST or not _rests(values):
         return None
     sizes, extent = np.abs(np.diff(values)), float(np.ptp(values))
-    if not _rests(values):
-        return None
+    code = float(np.min(sizes, where=sizes > 0.0, initial=np.inf))
+    least = max(_STEP * extent, _CODES * code if code <= _COARSEST * extent else 0.0)
     beside = np.maximum(sizes[:-2], sizes[2:])
-    alone = (sizes[1:-1] > _STEP * extent) & (beside < _FLAT * sizes[1:-1])
+    alone = (sizes[1:-1] > least) & (beside < _FLAT * sizes[1:-1])
     if not alone.any():
         return None
     place = 1 + int(np.argmax(np.where(alone, sizes[1:-1], 0.0)))
