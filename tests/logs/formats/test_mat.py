@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import struct
-import sys
 from pathlib import Path
 from typing import Any, Literal
 
-import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -18,12 +16,11 @@ from scipy.io import savemat
 from scipy.io.matlab import MatlabOpaque
 
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
-from drivetwin.errors import FileFormatError, MissingChannelError, MissingExtraError, UnitError
+from drivetwin.errors import MissingChannelError, UnitError
 from drivetwin.logs.formats.mat_signals import find_signals
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
-from tests.fuzz.seeds import SEEDS
 
 ROOT = Path(__file__).resolve().parents[3]
 TRUCK_C = ROOT.parent / "shared" / "logs" / "truck_c.mat"
@@ -186,35 +183,6 @@ def test_version_4(tmp_path: Path, order: Literal["<", ">"]) -> None:
     assert np.array_equal(found["n_in"].values, (time[:, 0] * 1.1).astype(np.float32))
     assert (found["n_in"].unit, found["gear"].unit) == ("rpm", None)
     assert np.array_equal(found["gear"].values, 3 - time[:, 0])
-
-
-def test_version_7_3(tmp_path: Path) -> None:
-    path = tmp_path / "log.mat"
-    path.write_bytes(SEEDS["mat73"](tmp_path))
-    found = by_name(read_raw(path))
-    assert found["SpdIn"].unit == "rpm"
-    assert found["SpdIn"].time.size == 200
-    with h5py.File(tmp_path / "seed73.mat") as file:
-        assert np.array_equal(found["SpdIn"].values, file["SpdIn"][:, 0])
-
-
-def test_version_7_3_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "log.mat"
-    path.write_bytes(SEEDS["mat73"](tmp_path))
-    monkeypatch.setitem(sys.modules, "pymatreader", None)
-    with pytest.raises(MissingExtraError) as caught:
-        read_raw(path)
-    assert caught.value.remedy == 'pip install "drivetwin[io]"'
-
-
-@pytest.mark.parametrize("keep", [20, 128, 150, 1000])
-def test_a_cut_file_is_told(tmp_path: Path, keep: int) -> None:
-    path = tmp_path / "log.mat"
-    savemat(path, {"t": T, "x": np.sin(T)})
-    path.write_bytes(path.read_bytes()[:keep])
-    with pytest.raises(FileFormatError) as caught:
-        read_raw(path)
-    assert caught.value.remedy
 
 
 NAMES = st.text("abcdefgXYZ", min_size=2, max_size=6)

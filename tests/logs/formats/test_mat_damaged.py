@@ -82,15 +82,6 @@ def test_damaged_structure_changes_nothing_or_is_a_typed_error(
         check(tmp_path, bytes(damaged))
 
 
-@pytest.mark.parametrize("compressed", [True, False])
-def test_cut_files_are_refused(tmp_path: Path, compressed: bool) -> None:
-    whole = written(compressed)
-    first = int.from_bytes(whole[132:136], "little")
-    for size in range(137, 136 + first, 7):
-        with pytest.raises(FileFormatError):
-            check(tmp_path, whole[:size])
-
-
 def written4(folder: Path) -> bytes:
     path = folder / "whole4.mat"
     content = {name: CONTENT[name] for name in ("x", "x_t", "text", "z")}

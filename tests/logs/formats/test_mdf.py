@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivetwin.channels.read_options import Column, ReadOptions, TimeColumn
-from drivetwin.errors import DamagedChannelError, FileFormatError, MissingExtraError
+from drivetwin.errors import DamagedChannelError, FileFormatError
 from drivetwin.logs.formats import mdf
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.raw import RawChannel, RawLog
@@ -71,15 +71,6 @@ def test_equal_names_are_told_apart_by_group(tmp_path: Path) -> None:
         ("10ms task", FAST.size),
         ("100ms", SLOW.size),
     ]
-
-
-def test_a_window_reads_only_its_records(tmp_path: Path) -> None:
-    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
-    with open_recording(path) as recording:
-        part = recording.load(0, (0.5, 1.0))
-    inside = FAST[(FAST >= 0.5) & (FAST <= 1.0)]
-    assert np.array_equal(part.time, inside)
-    assert np.array_equal(part.values, inside)
 
 
 def test_records_in_several_pieces_are_those_of_the_file(
@@ -178,25 +169,6 @@ def test_of_two_groups_the_one_with_records_has_the_role(tmp_path: Path) -> None
     ]
     log = read_log(save(tmp_path / "log.mf4", groups, "4.10"), None, needed=())
     assert np.array_equal(log["engine_torque"].time, SLOW)
-
-
-def test_without_the_library_the_install_command_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = save(tmp_path / "log.mdf", [("g", [signal("x", FAST, FAST)])], "3.30")
-    monkeypatch.setitem(sys.modules, "asammdf", None)
-    with pytest.raises(MissingExtraError) as caught:
-        read_raw(path)
-    assert caught.value.remedy == 'pip install "drivetwin[mdf]"'
-
-
-@pytest.mark.parametrize("keep", [20, 64, 100, 200, 600, 3000])
-def test_a_cut_file_is_told(tmp_path: Path, keep: int) -> None:
-    path = save(tmp_path / "log.mf4", [("g", [signal("x", FAST, FAST)])], "4.10")
-    path.write_bytes(path.read_bytes()[:keep])
-    with pytest.raises(FileFormatError, match="cut or damaged") as caught:
-        read_raw(path)
-    assert caught.value.remedy
 
 
 def test_a_circle_of_blocks_is_told(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,7 @@ from hypothesis import strategies as st
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
 from drivetwin.errors import (
     DamagedChannelError,
-    FileFormatError,
     MissingChannelError,
-    MissingExtraError,
     TimeError,
     UnitError,
 )
@@ -127,26 +124,6 @@ def test_texts_are_no_numbers(tmp_path: Path) -> None:
     pq.write_table(table({"t": "s"}, t=T, x=["a", "b", "c", "d"]), path)
     with open_recording(path) as recording, pytest.raises(DamagedChannelError, match="string"):
         recording.load(0)
-
-
-def test_without_the_library_the_install_command_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "log.parquet"
-    pq.write_table(table(t=T), path)
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(MissingExtraError) as caught:
-        read_raw(path)
-    assert caught.value.remedy == 'pip install "drivetwin[io]"'
-
-
-@pytest.mark.parametrize("keep", [4, 50, 400])
-def test_a_cut_file_is_told(tmp_path: Path, keep: int) -> None:
-    path = tmp_path / "log.parquet"
-    pq.write_table(table({"t": "s"}, t=T, x=T), path)
-    path.write_bytes(path.read_bytes()[:keep])
-    with pytest.raises(FileFormatError, match="cut or damaged"):
-        read_raw(path)
 
 
 @given(st.lists(st.one_of(st.none(), st.floats(allow_infinity=False)), min_size=1, max_size=40))

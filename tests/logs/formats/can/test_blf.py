@@ -4,15 +4,12 @@
 from __future__ import annotations
 
 import struct
-import sys
 from pathlib import Path
 
 import can
 import pytest
 
-from drivetwin.errors import FileFormatError, MissingExtraError
 from drivetwin.logs.formats.can.blf import read_blf
-from tests.fuzz.seeds import SEEDS
 
 
 def test_frames_without_signals_are_counted(tmp_path: Path) -> None:
@@ -33,25 +30,6 @@ def test_frames_without_signals_are_counted(tmp_path: Path) -> None:
     assert frames.time.size == 3
     assert frames.identifier.tolist() == [0x123] * 3
     assert frames.warnings == ("1 remote or error frames left out",)
-
-
-@pytest.mark.parametrize("keep", [10, 144, 200])
-def test_a_cut_blf_is_told(tmp_path: Path, keep: int) -> None:
-    path = tmp_path / "bus.blf"
-    path.write_bytes(SEEDS["blf"](tmp_path)[:keep])
-    with pytest.raises(FileFormatError):
-        read_blf(path)
-
-
-def test_without_the_library_the_install_command_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "bus.blf"
-    path.write_bytes(SEEDS["blf"](tmp_path))
-    monkeypatch.setitem(sys.modules, "can", None)
-    with pytest.raises(MissingExtraError) as caught:
-        read_blf(path)
-    assert caught.value.remedy == 'pip install "drivetwin[can]"'
 
 
 class SignedStamps:

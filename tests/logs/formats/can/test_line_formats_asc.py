@@ -10,7 +10,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.errors import FileFormatError
 from drivetwin.logs.formats.can.texts import is_bus_text, read_bus_text
 from drivetwin.logs.formats.frames import Frames
 
@@ -155,8 +154,3 @@ def test_stamps_from_event_to_event_are_added_up() -> None:
     assert "time stamps from event to event added up; after a damaged line they are early" in (
         found.warnings
     )
-
-
-def test_no_frame_is_told() -> None:
-    with pytest.raises(FileFormatError, match="no frame"):
-        read("End TriggerBlock\n")

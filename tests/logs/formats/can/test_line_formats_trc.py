@@ -175,11 +175,6 @@ def test_columns_without_frames(columns: str) -> None:
         read(VERSION_2_1.replace("N,O,T,B,I,d,R,L,D", columns))
 
 
-def test_no_frame_is_told() -> None:
-    with pytest.raises(FileFormatError, match="no frame"):
-        read(VERSION_1_1.partition("     1)")[0])
-
-
 def test_what_is_no_trace() -> None:
     assert not is_bus_text(b"; comment\ntime;n\n0.01;1\n")
     assert not is_bus_text(b"time,n\n0.01,1\n")

@@ -29,18 +29,19 @@ def read_blf(path: Path) -> Frames:
 def _read_frames(reader: Any, kind: str, path: Path) -> Frames:
     """The table of data frames; what breaks off is read up to there."""
     messages: list[Any] = []
-    broken: tuple[str, ...] = ()
+    size = path.stat().st_size
+    cut = f"the file is cut: {size} of the {reader.file_size} bytes that its head states"
+    broken: tuple[str, ...] = (cut,) if size < reader.file_size else ()
     try:
         with handle_parser_errors(kind, path):
             messages.extend(reader)
     except FileFormatError as fault:
         if not messages:
             raise
-        broken = (f"{fault.what}; {len(messages)} frames were read before",)
+        broken += (f"{fault.what}; {len(messages)} frames were read before",)
     frames = [one for one in messages if _is_data(one)]
     if not frames:
-        what = "no frame can be read"
-        raise FileFormatError(what, "record it again", Where(file=str(path)))
+        raise FileFormatError("no frame can be read", "record it again", Where(file=str(path)))
     stamps = [one.timestamp for one in frames]
     return build_frames(
         _count_from_start(stamps, reader.start_timestamp).tolist(),
