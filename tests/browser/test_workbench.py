@@ -69,7 +69,7 @@ def test_from_a_log_to_a_saved_and_reopened_model(
     _report_picture(browser, next(tmp_path.glob("*.report.html")), pictures)
 
     show_view(page, "workspace")
-    page.get_by_label("Name").fill("session")
+    page.get_by_label("Name", exact=True).fill("session")
     page.get_by_role("button", name="Save", exact=True).click()
     expect_message(page, "saved as session.workspace.json")
     assert (bench.folder / "session.workspace.json").exists()
