@@ -73,7 +73,7 @@ def test_what_hangs_eats_or_kills_is_quarantined_with_its_reason(tmp_path: Path)
     for number, error in enumerate(("TimeLimit", "MemoryLimit", "WorkerLost")):
         assert names(events, error=error) == [f"log_{number:04d}"]
     texts = {row["error"]: row["what"] for row in contents(store)["logs"]}
-    assert "2 s" in texts["TimeLimit"]
+    assert "5 s" in texts["TimeLimit"]
     assert "200 MiB" in texts["MemoryLimit"]
     assert "lost 2 times" in texts["WorkerLost"]
     assert "SIGKILL" in texts["WorkerLost"]
