@@ -272,23 +272,23 @@ def _check_scale_from_mass(found: Identification, card: VehicleCard) -> None:
     none = EffectPriors({effect: EffectPrior(0.0) for effect in EffectId})
     drivelines = [build_driveline(known, found.shifts[0])]
     result = build_estimates(fit, signals, drivelines, {}, none)
-    told = result.estimates
-    ratio, stiffness = (told[f"{one}_over_eta"].value for one in ("J_vehicle", "k_o"))
+    values = result.estimates
+    ratio, stiffness = (values[f"{one}_over_eta"].value for one in ("J_vehicle", "k_o"))
     assert ratio is not None
     assert stiffness is not None
-    eta = told["eta"]
+    eta = values["eta"]
     assert eta.value == pytest.approx(mass.value / ratio)
     assert eta.verdict is Verdict.IDENTIFIED
-    own = (told["J_vehicle_over_eta"].std_total or 0.0) / ratio
+    own = (values["J_vehicle_over_eta"].std_total or 0.0) / ratio
     assert eta.std_total == pytest.approx(mass.value / ratio * np.hypot(0.02, own))
-    assert told["J_vehicle"].value == pytest.approx(mass.value)
-    assert told["J_vehicle"].std_total == pytest.approx(mass.std)
-    assert told["J_vehicle"].verdict is Verdict.DESIGN
-    assert told["k_o"].value == pytest.approx(mass.value / ratio * stiffness)
+    assert values["J_vehicle"].value == pytest.approx(mass.value)
+    assert values["J_vehicle"].std_total == pytest.approx(mass.std)
+    assert values["J_vehicle"].verdict is Verdict.DESIGN
+    assert values["k_o"].value == pytest.approx(mass.value / ratio * stiffness)
     assert result.joint is not None
     place = [result.joint.ids.index(one) for one in ("eta", "k_o", "J_vehicle")]
     std = np.sqrt(np.diag(result.joint.covariance))[place]
-    assert std == pytest.approx([told[result.joint.ids[k]].std_total for k in place])
+    assert std == pytest.approx([values[result.joint.ids[k]].std_total for k in place])
     correlation = result.joint.covariance[np.ix_(place, place)] / np.outer(std, std)
     assert correlation.min() > 0.9
     wrong = replace(card, known={"J_vehicle": PriorValue(2.0 * over_eta, 0.02 * over_eta)})
@@ -298,15 +298,15 @@ def _check_scale_from_mass(found: Identification, card: VehicleCard) -> None:
 
 
 def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> None:
-    """With η on the card the absolute values are told, and η's spread is their systematic part."""
+    """With η on the card absolute values are given; the spread of η is their systematic part."""
     known = replace(card, known={"eta": PriorValue(0.9, 0.02)})
     driveline = build_driveline(known, found.shifts[0])
     fit, signals = get_likelihood_fit(found)
     none = EffectPriors({effect: EffectPrior(0.0) for effect in EffectId})
-    told = build_estimates(fit, signals, [driveline], {}, none).estimates
-    ratio = told["J_vehicle_over_eta"]
+    values = build_estimates(fit, signals, [driveline], {}, none).estimates
+    ratio = values["J_vehicle_over_eta"]
     assert ratio.value is not None
-    assert told["J_vehicle"].value == pytest.approx(0.9 * ratio.value)
-    assert told["J_vehicle"].std_systematic == pytest.approx(0.02 * ratio.value, rel=1e-5)
-    assert told["J_vehicle"].method == WITH_ETA
-    assert told["eta"].verdict is Verdict.DESIGN
+    assert values["J_vehicle"].value == pytest.approx(0.9 * ratio.value)
+    assert values["J_vehicle"].std_systematic == pytest.approx(0.02 * ratio.value, rel=1e-5)
+    assert values["J_vehicle"].method == WITH_ETA
+    assert values["eta"].verdict is Verdict.DESIGN

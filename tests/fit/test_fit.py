@@ -262,7 +262,7 @@ def add_input(name: str) -> tuple[NetworkModel, list[Recording]]:
     return change_recording(inputs={**inputs, name: inputs["torque"]})
 
 
-def known_start(name: str) -> Recording:
+def make_known_start(name: str) -> Recording:
     return replace(record_two_sided(), start={name: 10.0})
 
 
@@ -308,7 +308,7 @@ def loosen(element: str, **ends: str) -> tuple[NetworkModel, list[Recording]]:
         ),
         (change_recording(outputs=change_outputs(sigma=-1.0)), "outputs.motor: the noise sigma"),
         (
-            (make_small({"start.motor": STIFFNESS})[0], [known_start("motor")]),
+            (make_small({"start.motor": STIFFNESS})[0], [make_known_start("motor")]),
             "start.motor: known by the recording",
         ),
         (

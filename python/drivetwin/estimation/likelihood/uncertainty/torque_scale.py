@@ -40,7 +40,7 @@ METHOD = "likelihood"
 WITH_ETA = "likelihood over η, times η from design"
 """Method of a torque-like parameter of a log without an output torque, where η is on the card."""
 WITH_SCALE = "likelihood over η, scale from the vehicle card"
-"""The same where another absolute value is on the card."""
+"""Method of absolute values whose scale is another absolute value on the card."""
 _UNSCALED_LAW = LAW_KEYS[3]
 """Coefficient of a friction law that is no friction: ln v_s."""
 
