@@ -15,6 +15,7 @@ from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import admit_excluded
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.optimize.initial_guess import (
     estimate_initial_values,
     estimate_without_torque,
@@ -164,13 +165,19 @@ def _fit(
         try:
             best, notes = select_model(signals, drivelines, loss_law, guess, priors)
         except IdentificationError:
-            found = _search_again(signals, drivelines, loss_law, guess, priors)
+            found = (
+                _search_again(signals, drivelines, loss_law, guess, priors)
+                if is_enabled(Mechanism.LOWER_GEAR)
+                else None
+            )
             if found is None:
                 raise
             best, notes = found, tuple(report_modes(found.problem.modes))
     with _STAGES.enter("plant", "elements of the plant"):
-        admitted, warnings = admit_excluded(best, priors)
-        best = try_plants(best, admitted) if with_plants else best
+        admits = is_enabled(Mechanism.ADMISSION)
+        admitted, warnings = admit_excluded(best, priors) if admits else (priors, ())
+        if with_plants and is_enabled(Mechanism.PLANTS):
+            best = try_plants(best, admitted)
         return _SelectedFit(best, admitted, (*notes, *warnings))
 
 

@@ -35,6 +35,7 @@ from drivetwin.estimation.likelihood.coloured_noise import compute_block_means, 
 from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
     fit_local,
@@ -106,7 +107,8 @@ def _far_apart(problem: ShiftObjective) -> frozenset[str]:
     periods = [
         out.get_period(one.record.time) for one in problem.terms for out in one.record.outputs
     ]
-    return _shown(problem) if min(periods) > SLOW else frozenset()
+    is_slow = min(periods) > SLOW and is_enabled(Mechanism.FAR_MODES)
+    return _shown(problem) if is_slow else frozenset()
 
 
 def _find_nearby_modes(problem: ShiftObjective, point: ParameterVector) -> frozenset[str] | None:
@@ -390,7 +392,7 @@ def _choices(
         gradient, information = effects.join(normal)
         answers = sum(w.T @ one for w, one in zip(effects.weighted, changes, strict=True))
         cross = np.vstack([cross, np.asarray(answers)])
-    shown = {*_shown(problem), TORQUE}
+    shown = {*_shown(problem), TORQUE} if is_enabled(Mechanism.SAMPLING_MODES) else set()
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
     gradients = gradient + flips @ cross.T
     steps = np.array([solve_step(information, one) for one in gradients])

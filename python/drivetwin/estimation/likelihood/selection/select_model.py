@@ -23,6 +23,7 @@ from drivetwin.estimation.likelihood.diagnostics.identifiability import locate_b
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
+from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
     NoConvergence,
@@ -93,7 +94,8 @@ def select_model(
     shifts = [s.shift for s in signals]
     growing = {**guess, AERO: max(guess.get(AERO, 0.0), SELECTION.min_aero)}
     constant = {name: value for name, value in guess.items() if name != AERO}
-    problem, start = build_problem(signals, drivelines, loss_law, growing, hilly=True)
+    first = growing if is_enabled(Mechanism.LOAD_GROWTH) else constant
+    problem, start = build_problem(signals, drivelines, loss_law, first, hilly=True)
     with _STAGES.enter("search"), limit_evaluations(SELECTION.max_work) as search:
         best = fit_candidates(problem, start, shifts)
     with _STAGES.enter("bounds"), limit_evaluations(min(MAX_REFIT_WORK, search.left)):
@@ -104,7 +106,8 @@ def select_model(
     ):
         best = refit_slow_outputs(problem, best)
     with _STAGES.enter("restriction"), limit_evaluations(SELECTION.max_restricted_work):
-        absent, point = find_absent_terms(best)
+        is_chosen = is_enabled(Mechanism.LOAD_TERMS)
+        absent, point = find_absent_terms(best) if is_chosen else ([], best.point)
         guess = constant if GROWING_LOAD in absent else growing
         hilly = LOAD_OF_EACH_SHIFT not in absent
         narrower = build_problem(signals, drivelines, loss_law, guess, hilly=hilly)
@@ -114,12 +117,16 @@ def select_model(
         _STAGES.enter("minima", "other minima"),
         limit_evaluations(min(MAX_REFIT_WORK, search.left)),
     ):
-        best = try_minima(best, problem)
+        best = try_minima(best, problem) if is_enabled(Mechanism.OTHER_MINIMA) else best
     with (
         _STAGES.enter("averaging", "modes of signals"),
         limit_evaluations(min(MAX_REFIT_WORK, search.left)),
     ):
-        best, doubts = _average_modes(problem, best, priors)
+        best, doubts = (
+            _average_modes(problem, best, priors)
+            if is_enabled(Mechanism.MODE_AVERAGE)
+            else (best, [])
+        )
     with _STAGES.enter("other outputs"), limit_evaluations(MAX_REFIT_WORK):
         best, either = widen_over_modes(problem, best)
     return best, (*notes, *report_modes(best.problem.modes), *dict.fromkeys((*doubts, *either)))
