@@ -3,16 +3,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
 
 import drivetwin
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
@@ -20,8 +17,8 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.result.method import Method
 from drivetwin.pipeline import identify
-from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.vehicle_card import VehicleCard
+from tests.support.bench import NO_EFFECT, read_run
 from tests.support.shared_results import shared
 
 DURATION = 3.3
@@ -30,26 +27,12 @@ RATE = 400.0
 
 
 def record_log(scenario: str, P0_std: float = 0.0) -> tuple[ShiftLog, VehicleCard]:
-    """Record a scenario and read its log.
-
-    The card leaves P0 a spread of `P0_std` [Pa] and states that the model leaves no effect out, as
-    is true of the dynamometer: intervals are those of noise.
-    """
+    """Record a scenario and read its log, by a card that states no effect: intervals are those of
+    noise. P0 has a spread of `P0_std` [Pa]."""
     base = load_scenario(scenario)
     sensors = tuple(replace(s, rate=min(s.rate, RATE)) for s in base.sensors)
     made = run(replace(base, duration=DURATION, sensors=sensors), seed=3)
-    with tempfile.TemporaryDirectory() as folder:
-        log_file, card_file, _ = write_run(Path(folder) / "log.csv", made)
-        card = drivetwin.load_card(card_file)
-        elements = {
-            name: replace(one, P0=replace(one.P0, std=P0_std))
-            for name, one in card.elements.items()
-        }
-        none = {effect: EffectPrior(0.0) for effect in EffectId}
-        card = replace(card, elements=elements, effects=none)
-        mapping = Path(folder) / "rows.toml"
-        mapping.write_text("[time]\nsimultaneous = true\n", encoding="utf-8")
-        return drivetwin.read_log(log_file, card, mapping), card
+    return read_run(made, "[time]\nsimultaneous = true\n", P0_std, effects=NO_EFFECT)
 
 
 def _identified(scenario: str, method: Method, P0_std: float = 0.0) -> Identification:

@@ -3,11 +3,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+import drivetwin
 from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.scenario import Scenario
@@ -17,9 +23,15 @@ from drivetwin.estimation.data.shift_data import (
     ShiftElementKinematics,
     ShiftSignals,
 )
+from drivetwin.estimation.identification import Identification
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
+
+NO_EFFECT = {effect: EffectPrior(0.0) for effect in EffectId}
+"""Statement of a card that the model leaves nothing out, as is true of the dynamometer."""
 
 SHIFT_SIGMA = {"torque_start": 0.01, "inertia_start": 0.001, "lockup": 0.0005}
 """What shift detection states of its instants on such logs [s]."""
@@ -110,3 +122,30 @@ def _sample_signals(made: DynoRun) -> ShiftSignals:
         shift,
         estimate_rounding_step(channels["engine_torque"].values),
     )
+
+
+def read_run(
+    made: DynoRun, mapping: str = "", P0_std: float | None = None, **stated: Any
+) -> tuple[ShiftLog, VehicleCard]:
+    """Write a run to files and read its log and card; `stated` replaces fields of the card.
+
+    `mapping` is the text of a channel mapping; with `P0_std` the card leaves P0 that spread [Pa].
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        log_file, card_file, _ = write_run(Path(folder) / "log.csv", made)
+        card = replace(drivetwin.load_card(card_file), **stated)
+        if P0_std is not None:
+            elements = {
+                name: replace(one, P0=replace(one.P0, std=P0_std))
+                for name, one in card.elements.items()
+            }
+            card = replace(card, elements=elements)
+        rows = Path(folder) / "mapping.toml"
+        rows.write_text(mapping, encoding="utf-8")
+        return drivetwin.read_log(log_file, card, rows if mapping else None), card
+
+
+def identify_run(made: DynoRun, P0_std: float | None = None, **stated: Any) -> Identification:
+    """Identify the log of a run by its card, of which `stated` replaces fields."""
+    log, card = read_run(made, "", P0_std, **stated)
+    return drivetwin.identify(log, card, drivetwin.detect_shifts(log, card))

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.priors import build_problem
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
-from drivetwin.estimation.optimize.objective import ParameterVector
 from tests.support.bench import Bench, Knowledge, record_bench
 from tests.support.shared_results import shared
 
@@ -50,7 +49,7 @@ def truth_of(made: Bench) -> dict[str, float]:
     return values
 
 
-def problem(made: Bench, off: float = 0.0) -> tuple[ShiftObjective, ParameterVector]:
+def problem(made: Bench, off: float = 0.0) -> tuple[Any, Any]:
     """The fit of a log, started `off` (relative) beside the truth, alternately up and down."""
     guess = {
         name: value * (1.0 + off * (-1) ** k)
@@ -60,7 +59,7 @@ def problem(made: Bench, off: float = 0.0) -> tuple[ShiftObjective, ParameterVec
 
 
 @shared
-def fitted(seed: int = 0) -> LikelihoodFit:
+def fitted(seed: int = 0) -> Any:
     made = bench(seed)
     posed, start = problem(made)
     return fit_multistart(posed, start, [made.signals.shift])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Intervals count errors slower than white noise, and only those."""
+"""Slow errors of a sensor widen intervals, white noise does not."""
 
 from __future__ import annotations
 
@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from drivetwin.estimation.likelihood.fit import (
-    LikelihoodFit,
-    compute_covariance,
-    invert_information,
-)
+from drivetwin.estimation.likelihood.fit import compute_covariance
 from tests.estimation.likelihood.fixtures import fitted
 from tests.support.arrays import FloatArray
 
@@ -21,10 +17,10 @@ FILTER = 0.8
 """Share of a sample that stays until the next: a filter of 4.5 ms at 1 kHz."""
 
 
-def _draws(fit: LikelihoodFit, count: int, slow: bool) -> FloatArray:
+def _draw(count: int, slow: bool) -> FloatArray:
     """Sensor noise (n, count) of the fit's only shift; the output torque's of its power, filtered
     where it is `slow`."""
-    (term,) = fit.problem.terms
+    (term,) = fitted().problem.terms
     noise = np.random.default_rng(1).standard_normal((term.record.size, count))
     torque = term.record.outputs[0]
     assert torque.name == "output_torque"
@@ -35,26 +31,20 @@ def _draws(fit: LikelihoodFit, count: int, slow: bool) -> FloatArray:
     return np.asarray(term.record.sigma[:, None] * noise)
 
 
-def _spread(fit: LikelihoodFit, residual: FloatArray) -> FloatArray:
+def _spread(residual: FloatArray) -> FloatArray:
+    fit = fitted()
     return compute_covariance(fit.problem, replace(fit.normal, residuals=(residual,)), 1.0)
 
 
 def test_a_filtered_sensor_widens_intervals_to_what_its_noise_does() -> None:
-    fit = fitted()
-    noise = _draws(fit, 100, slow=True)
-    plain = invert_information(fit.normal.information)
+    fit, noise = fitted(), _draw(100, slow=True)
+    plain = _spread(_draw(1, slow=False)[:, 0])
+    assert np.diag(plain @ fit.normal.information) == pytest.approx(1.0, rel=1e-6)
     moves = plain @ (fit.normal.regressors[0].T @ noise)
-    told = _spread(fit, noise[:, 0])
+    told = _spread(noise[:, 0])
     for name in ("eta", "Tv_over_if", "J_vehicle"):
         k = fit.point.names.index(name)
         scatter = float(np.std(moves[k]))
         assert scatter > 1.3 * np.sqrt(plain[k, k]), "the case is of no use"
         # Blocks of 20 ms show the noise of this filter nearly, a log's mean all of it.
         assert 0.7 * scatter < np.sqrt(told[k, k]) < 1.5 * scatter
-
-
-def test_white_noise_widens_nothing() -> None:
-    fit = fitted()
-    plain = invert_information(fit.normal.information)
-    told = _spread(fit, _draws(fit, 1, slow=False)[:, 0])
-    assert told == pytest.approx(plain, rel=1e-12, abs=0.0)

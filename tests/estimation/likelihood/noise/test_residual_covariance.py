@@ -4,50 +4,35 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from drivetwin.estimation.data.shift_data import TorqueOfSpeeds
-from drivetwin.estimation.likelihood.data.output import Output
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE
-from drivetwin.estimation.likelihood.noise.residual_covariance import build_sensor_whitener
-from drivetwin.estimation.likelihood.noise.shift_response import build_output_row, linearise_run
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm, weight_by_inputs
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 from tests.support.arrays import FloatArray
 
+TORQUE = "engine torque"
 
-def _short() -> tuple[ShiftTerm, ParameterVector]:
+
+def _short() -> tuple[Any, Any]:
     posed, start = problem(bench())
-    term = posed.terms[0]
-    return ShiftTerm.from_sensor_noise(
-        term.structure, term.record.cut(term.record.time[0] + 0.15)
-    ), start
+    return posed.cut([posed.terms[0].record.time[0] + 0.15]).terms[0], start
 
 
 def test_weighting_equals_the_dense_covariance() -> None:
     term, point = _short()
-    run = term.simulate(point)
-    assert run is not None
-    model, record = term.structure.build_model(point), term.record
-    response = linearise_run(model, run, record)
-    whiteness = weight_by_inputs(model, record, response)
-    assert whiteness.path is not None
-    columns = []
-    for name, power in whiteness.path.power.items():
-        for k in range(record.time.size - 1):
-            impulse = np.zeros(record.time.size - 1)
-            impulse[k] = np.sqrt(power[k])
-            z = response.propagate_inputs({name: impulse})
-            columns.append(
-                np.concatenate(
-                    [z[out.place] @ build_output_row(model, out.name) for out in record.outputs]
-                )
-            )
-    G = np.column_stack(columns)
+    record, response = term.record, term.compute_response(point, term.simulate(point))
+    whiteness = term.update_weighting(point).weighting
+    G = np.column_stack(
+        [
+            term.observe(point, response.propagate_inputs({name: impulse}))
+            for name, power in whiteness.path.power.items()
+            for impulse in np.diag(np.sqrt(power))
+        ]
+    )
     dense = np.diag(record.sigma**2) + G @ G.T
     columns_in: FloatArray = np.random.default_rng(0).standard_normal((record.size, 3))
     columns_in *= record.sigma[:, None]
@@ -56,7 +41,7 @@ def test_weighting_equals_the_dense_covariance() -> None:
     assert np.allclose(found, expected * record.sigma[:, None], rtol=1e-3, atol=1e-2)
 
 
-def _select_speeds(term: ShiftTerm, slope: float, rest: float) -> ShiftTerm:
+def _select_speeds(term: Any, slope: float, rest: float) -> Any:
     """The part with an engine torque computed from ω_e, on which it hangs by `slope`."""
     record, read = term.record, term.record.engine_torque
     torque = Signal(record.time, np.interp(record.time, read.time, read.values))
@@ -67,7 +52,7 @@ def _select_speeds(term: ShiftTerm, slope: float, rest: float) -> ShiftTerm:
     return replace(term, record=made)
 
 
-def _torque_by_speed(term: ShiftTerm) -> FloatArray:
+def _torque_by_speed(term: Any) -> FloatArray:
     """Noise of the engine torque over each step per that of a compared sample (N-1, n)."""
     record, torque = term.record, term.record.engine_torque.time
     assert record.of_speeds is not None
@@ -84,12 +69,8 @@ def _torque_by_speed(term: ShiftTerm) -> FloatArray:
 def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     term, point = _short()
     term = _select_speeds(term, slope=-400.0, rest=2.0)
-    run = term.simulate(point)
-    assert run is not None
-    model, record = term.structure.build_model(point), term.record
-    response = linearise_run(model, run, record)
-    whiteness = weight_by_inputs(model, record, response)
-    assert whiteness.path is not None
+    record, whiteness = term.record, term.update_weighting(point).weighting
+    response = term.compute_response(point, term.simulate(point))
     effect = {}
     for name in response.drive:
         steps = np.eye(record.time.size - 1)
@@ -114,7 +95,6 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
 def test_its_determinant_is_that_of_the_dense_covariance() -> None:
     term, point = _short()
     weighting = term.update_weighting(point).weighting
-    assert weighting.path is not None
     dense = np.linalg.inv(weighting.apply_inverse(np.eye(term.record.size)))
     sensors = term.weighting.log_determinant
     assert sensors == pytest.approx(2.0 * np.sum(np.log(term.record.sigma)), rel=1e-12)
@@ -124,29 +104,29 @@ def test_its_determinant_is_that_of_the_dense_covariance() -> None:
     assert weighting.log_determinant == pytest.approx(expected, abs=1e-3 * more)
 
 
-def _sparse(every: int) -> tuple[ShiftTerm, ParameterVector]:
+def _sparse(every: int) -> tuple[Any, Any]:
     """A shift up to lock-up of which outputs and pressures show one sample in so many."""
     made = bench()
     posed, start = problem(made)
     term = posed.cut([made.signals.shift.lockup_time - 0.02]).terms[0]
     record = term.record
     outputs = tuple(
-        Output(out.name, out.place[::every], out.values[::every], out.sigma)
-        for out in record.outputs
+        replace(out, place=out.place[::every], values=out.values[::every]) for out in record.outputs
     )
     pressures = {
         name: Signal(p.time[::every], p.values[::every]) for name, p in record.pressures.items()
     }
     sigma = {**record.input_sigma, TORQUE: 0.03}
     sparse = replace(record, outputs=outputs, pressures=pressures, input_sigma=sigma, held_back={})
-    return ShiftTerm.from_sensor_noise(term.structure, sparse).update_weighting(start), start
+    return term.from_sensor_noise(term.structure, sparse).update_weighting(start), start
 
 
-def _filtered(term: ShiftTerm, point: ParameterVector, columns: FloatArray) -> FloatArray:
+def _filtered(term: Any, point: Any, columns: FloatArray) -> FloatArray:
     """Products (q, q) of columns (n, q) weighted by a Kalman filter, sample after sample."""
     path, record = term.weighting.path, term.record
-    assert path is not None
-    response, model = path.response, term.structure.build_model(point)
+    response = path.response
+    ones = np.ones((record.time.size, 1))
+    rows = np.column_stack([term.observe(point, ones * state) for state in np.eye(4)])
     quiet = np.diag(1.0 / np.diag(path.inverse[0]))
     spread, state = quiet.copy(), np.zeros((len(quiet), columns.shape[1]))
     products = np.zeros((columns.shape[1], columns.shape[1]))
@@ -162,7 +142,7 @@ def _filtered(term: ShiftTerm, point: ParameterVector, columns: FloatArray) -> F
             past = response.transition[step]
             spread, state = past @ spread @ past.T + quiet + pushed, past @ state
         now = k
-        row, out = build_output_row(model, record.outputs[o].name), record.outputs[o]
+        row, out = rows[first[o]], record.outputs[o]
         error = columns[first[o]] - row @ state
         first[o] += 1
         variance = float(row @ spread @ row) + out.sigma**2
@@ -187,10 +167,8 @@ def test_slow_samples_weigh_as_a_kalman_filter_weighs_them(every: int) -> None:
 def test_without_input_noise_the_sensors_weigh_alone() -> None:
     term, _ = _short()
     residual = np.ones(term.record.size)
-    assert np.allclose(
-        build_sensor_whitener(term.record.sigma).apply_inverse(residual), term.record.sigma**-2
-    )
-    assert not np.any(build_sensor_whitener(term.record.sigma).estimate_input_share(residual))
+    assert np.allclose(term.weighting.apply_inverse(residual), term.record.sigma**-2)
+    assert not np.any(term.weighting.estimate_input_share(residual))
 
 
 def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> None:
@@ -198,15 +176,13 @@ def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> 
     speeds = tuple(one for one in term.record.outputs if one.name.endswith("speed"))
     silent = {**term.record.input_sigma, TORQUE: 0.0}
     record = replace(term.record, outputs=speeds, input_sigma=silent)
-    weighted = ShiftTerm.from_sensor_noise(term.structure, record).update_weighting(point)
+    weighted = term.from_sensor_noise(term.structure, record).update_weighting(point)
     assert weighted.weighting.path is not None
 
 
 def test_expected_inputs_move_back_towards_the_truth() -> None:
     found = fitted(0)
     term = found.problem.terms[0]
-    run = term.simulate(found.point)
-    assert run is not None
     measured, _ = problem(bench())
     record, exact = measured.terms[0].record, bench(noise=0.0).signals.pressures["B3"]
     shift = bench().signals.shift
@@ -230,8 +206,6 @@ def test_what_is_held_back_acts_on_the_residual_as_on_a_run() -> None:
     smooth = replace(term, record=replace(term.record, held_back=small))
     read = replace(term, record=replace(term.record, pressures=whole, held_back={}))
     runs = smooth.simulate(truth), read.simulate(truth)
-    assert runs[0] is not None
-    assert runs[1] is not None
     before = smooth.compute_residual(runs[0])
     expected = (read.compute_residual(runs[1]) - before) / term.record.sigma
     found = (smooth.update_weighting(truth).compute_residual(runs[0]) - before) / term.record.sigma

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The fit against known truth: exact without noise, honest with it, and failing aloud."""
+"""Starts of the fit: from beside and far from the truth, and where the model is wrong."""
 
 from __future__ import annotations
 
@@ -8,22 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.optimize import multistart as fitting
-from drivetwin.estimation.likelihood.optimize.multistart import (
-    MULTI_START,
-    fit_local,
-    fit_lower_gear_only,
-    fit_multistart,
-)
-from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
+from drivetwin.estimation.likelihood.budget import limit_evaluations
+from drivetwin.estimation.likelihood.optimize.multistart import fit_local, fit_multistart
 from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem, truth_of
 from tests.support.bench import Knowledge, record_bench
 
 DRIVELINE = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
+DECREASE = 10.0
+"""Decrease of Q from which inputs are formed anew."""
 
 
 def test_ideal_sensors_return_every_parameter_from_a_start_beside_it() -> None:
@@ -51,9 +46,12 @@ def test_intervals_hold_the_truth_over_noise_realisations() -> None:
 
 
 def test_a_wrong_start_is_brought_in_by_stages() -> None:
+    """That Jo′ starts at its least value makes no difference."""
     made = bench()
     posed, start = problem(made, off=0.4)
-    found = fit_multistart(posed, start, [made.signals.shift])
+    values = start.values.copy()
+    values[start.names.index("J_out")] = 0.0
+    found = fit_multistart(posed, start.replace_values(values), [made.signals.shift])
     assert found.chi2 < 1.05
     near = fitted()
     std = np.sqrt(np.diag(near.covariance))
@@ -65,18 +63,26 @@ def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
     """B3 slips at twice the noise of its pressure above P0, B2 waits at its own."""
     base = load_scenario(ScenarioName.POWER_ON_DOWN)
     low = base.model.elements[1].P0 + 1.2e4
-    programs = {
-        "B3": Program(((2.15, 1.4e6), (2.20, low), (2.70, low), (2.75, 0.0))),
-        "B2": Program(
-            ((2.30, 0.0), (2.32, 7.6e4), (2.60, 7.6e4), (2.75, 3e5), (2.95, 3.6e5), (3.05, 1.4e6))
+    knots = {
+        "B3": ((2.15, 1.4e6), (2.20, low), (2.70, low), (2.75, 0.0)),
+        "B2": (
+            (2.30, 0.0),
+            (2.32, 7.6e4),
+            (2.60, 7.6e4),
+            (2.75, 3e5),
+            (2.95, 3.6e5),
+            (3.05, 1.4e6),
         ),
     }
-    actuators = {name: replace(base.actuators[name], command=programs[name]) for name in programs}
+    actuators = {
+        name: replace(one, command=replace(one.command, knots=knots[name]))
+        for name, one in base.actuators.items()
+    }
     posed, start = problem(record_bench(replace(base, actuators=actuators, duration=4.6), 1, ROUGH))
     found = fit_local(posed, start)
     assert found is not None
     again = posed.update_weighting(found.point).update_inputs(found.point)
-    assert again.cost(found.point) > found.normal.cost - MULTI_START.min_input_decrease
+    assert again.cost(found.point) > found.normal.cost - DECREASE
 
 
 def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
@@ -90,23 +96,12 @@ def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
 
 
 def test_input_noise_that_stages_leave_out_is_no_doubt() -> None:
-    """Outputs so quiet that at the truth all that is left is the noise of the inputs."""
-    posed, start = problem(bench(noise=0.02))
-    normal = posed.normal(start)
-    assert normal is not None
-    assert normal.cost > MULTI_START.doubtful_chi2 * posed.size
-    assert not fitting._is_doubtful(posed, OptimizeResult(posed, start, normal, True, 0))
-    posed, start = problem(bench(noise=0.02), off=0.05)
-    normal = posed.normal(start)
-    assert normal is not None
-    assert fitting._is_doubtful(posed, OptimizeResult(posed, start, normal, True, 0))
-
-
-def test_what_starts_at_zero_is_sought_too() -> None:
-    made = bench()
-    posed, start = problem(made)
-    values = start.values.copy()
-    values[start.names.index("J_out")] = 0.0
-    found = fit_lower_gear_only(posed, start.replace_values(values), [made.signals.shift])
-    assert found is not None
-    assert found.point["J_out"] > 0.0
+    """Outputs so quiet that at the truth all that is left is the noise of the inputs: one start is
+    enough, and from beside the truth several are compared."""
+    made, passes = bench(noise=0.02), []
+    for off in (0.0, 0.05):
+        posed, start = problem(made, off)
+        with limit_evaluations(1e4) as meter:
+            fit_multistart(posed, start, [made.signals.shift])
+        passes.append(1e4 - meter.left)
+    assert passes[0] < 120.0 < passes[1]
