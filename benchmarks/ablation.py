@@ -17,7 +17,14 @@ from functools import lru_cache
 from itertools import product
 from pathlib import Path
 
-from benchmarks.ablation_table import ALL_ON, Outcome, find_outcome, format_table, read_outcomes
+from benchmarks.ablation_table import (
+    ALL_ON,
+    Outcome,
+    find_outcome,
+    format_stages,
+    format_table,
+    read_outcomes,
+)
 from benchmarks.estimation.rough import make_vehicle, plan_vehicle
 from benchmarks.estimation.validity import (
     correct_delay,
@@ -135,6 +142,7 @@ def run_variant(study: str, seed: int, variant: str) -> Outcome:
         sum(stages.get(f"likelihood identification/{one}", 0.0) for one in PARTS),
         failure,
         find_idle(found, stages) if found is not None and variant == ALL_ON else (),
+        {name: one for name, one in stages.items() if one > IDLE},
     )
 
 
@@ -193,7 +201,8 @@ def main() -> None:
     given.output.parent.mkdir(parents=True, exist_ok=True)
     seeds = range(given.first, given.first + given.logs)
     run_study(seeds, given.study, given.without, given.output)
-    print("\n".join(format_table(read_outcomes(given.output))))
+    outcomes = read_outcomes(given.output)
+    print("\n".join([*format_table(outcomes), "", format_stages(outcomes)]))
 
 
 if __name__ == "__main__":

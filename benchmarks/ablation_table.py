@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.estimation.rough_count import FAR
@@ -22,7 +22,8 @@ class Outcome:
     """Result of one log in one variant, errors over total standard deviations by id.
 
     `possible` is the number of values that could be identified, `seconds` the CPU time of the
-    identification. `idle` lists the mechanisms that did nothing in the log, with all enabled.
+    identification, `stages` that of its stages. `idle` lists the mechanisms that did nothing in
+    the log, with all enabled.
     """
 
     study: str
@@ -34,6 +35,7 @@ class Outcome:
     seconds: float
     failure: str = ""
     idle: Sequence[str] = ()
+    stages: Mapping[str, float] = field(default_factory=dict)
 
 
 Outcomes = dict[tuple[str, int, str], Outcome]
@@ -72,9 +74,9 @@ def format_table(outcomes: Outcomes) -> list[str]:
     names = dict.fromkeys([ALL_ON, *(name for one in bases for name in one.idle)])
     names |= dict.fromkeys(one.variant for one in outcomes.values())
     lines = [
-        "| without | logs | run | inside | kept | far | in to out | out to in | new far "
-        "| lost | gained | largest change | CPU [s] | CPU |",
-        "|" + "---|" * 14,
+        "| without | logs | run | inside | kept | far | new far | now outside | now inside "
+        "| lost | gained | CPU [s] | CPU |",
+        "|" + "---|" * 13,
     ]
     for name in names:
         found = [(one, find_outcome(outcomes, one.study, one.seed, name)) for one in bases]
@@ -82,6 +84,27 @@ def format_table(outcomes: Outcomes) -> list[str]:
         if pairs:
             lines.append(_format_row(name, pairs))
     return lines
+
+
+STAGES: Mapping[str, tuple[str, ...]] = {
+    "far modes": ("model selection/slow outputs", "model selection/other outputs"),
+    "load terms": ("model selection/restriction",),
+    "other minima": ("model selection/minima",),
+    "mode average": ("model selection/averaging",),
+    "plants": ("likelihood/plant",),
+}
+"""Stages in which a mechanism acts."""
+
+
+def format_stages(outcomes: Outcomes) -> str:
+    """Format the share of the CPU time of each mechanism in the runs with all enabled."""
+    bases = [one for one in outcomes.values() if one.variant == ALL_ON and one.stages]
+    whole = sum(one.seconds for one in bases)
+    shares = []
+    for name, keys in STAGES.items() if bases else ():
+        own = sum(one.stages.get(key, 0.0) for one in bases for key in keys)
+        shares.append(f"{name} {100.0 * own / whole:.1f} %")
+    return f"CPU time by stage in {len(bases)} logs: {', '.join(shares)}"
 
 
 def _format_row(name: str, pairs: Sequence[Pair]) -> str:
@@ -102,12 +125,11 @@ def _format_row(name: str, pairs: Sequence[Pair]) -> str:
         f"{inside} of {len(identified)} = {100.0 * inside / max(len(identified), 1):.1f} %",
         f"{len(identified)} of {possible} = {100.0 * len(identified) / possible:.1f} %",
         sum(abs(z) > FAR for z in identified),
+        sum(_count_new_far(base, other) for base, other in pairs),
         sum(abs(old) < Z95 <= abs(new) for old, new in common),
         sum(abs(new) < Z95 <= abs(old) for old, new in common),
-        sum(_count_new_far(base, other) for base, other in pairs),
         sum(len(base.identified.keys() - other.identified.keys()) for base, other in pairs),
         sum(len(other.identified.keys() - base.identified.keys()) for base, other in pairs),
-        f"{max((abs(new - old) for old, new in common), default=0.0):.1f}",
         f"{sum(one.seconds for one in others) / len(pairs):.1f}",
         f"{100.0 * _compute_share(pairs):.0f} %",
     ]

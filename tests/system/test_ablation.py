@@ -34,7 +34,7 @@ def test_runs_what_is_missing_and_counts_idle_mechanisms_unchanged(
     ]  # fmt: skip
     rows = {line.split(" | ")[0].strip("| "): line for line in format_table(read_outcomes(file))}
     assert "| 2 | 1 | 2 of 4 = 50.0 % | 4 of 8 = 50.0 % | 0 | 0 | 0 | 0 |" in rows["plants"]
-    assert "| 2 | 2 | 2 of 4 = 50.0 % | 4 of 8 = 50.0 % | 2 | 0 | 0 | 2 |" in rows["load terms"]
+    assert "| 2 | 2 | 2 of 4 = 50.0 % | 4 of 8 = 50.0 % | 2 | 2 | 0 | 0 |" in rows["load terms"]
 
 
 def test_every_effect_is_in_one_group() -> None:
