@@ -152,16 +152,17 @@ def find_idle(found: Identification, stages: Mapping[str, float]) -> list[str]:
     Those that tried a fit are not among them: a fit that is not chosen may widen intervals.
     """
     fit = found.evidence.likelihood
-    if fit is None:
-        return []
-    selection = "model selection/other outputs" in stages
+    grows = fit is not None and AERO in fit.point.names
+    is_selected = "model selection/other outputs" in stages
     far = ("model selection/slow outputs", "model selection/other outputs")
+    is_restricted = "model selection/restriction" in stages and not grows
     is_idle = {
-        Mechanism.LOAD_GROWTH: selection and AERO not in fit.point.names,
-        Mechanism.LOAD_TERMS: AERO in fit.point.names and len(found.shifts) == 1,
-        Mechanism.FAR_MODES: all(stages.get(one, IDLE) < IDLE for one in far),
-        Mechanism.OTHER_MINIMA: selection and "minima/first refit" not in stages,
-        Mechanism.LOWER_GEAR: selection,
+        Mechanism.LOAD_GROWTH: is_selected and not grows,
+        Mechanism.LOAD_TERMS: len(found.shifts) == 1 and not is_restricted,
+        Mechanism.FAR_MODES: all(stages.get(one, 0.0) < IDLE for one in far),
+        Mechanism.OTHER_MINIMA: "minima/first refit" not in stages,
+        Mechanism.MODE_AVERAGE: "model selection/averaging" not in stages,
+        Mechanism.LOWER_GEAR: is_selected,
         Mechanism.ADMISSION: all(one.code is not Code.EFFECT_EXCLUDED for one in found.findings),
         Mechanism.PLANTS: "plant/first refit" not in stages,
     }
