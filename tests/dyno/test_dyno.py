@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -27,15 +25,6 @@ def test_noise_of_two_channels_is_independent() -> None:
     }
     a, b = (noisy[role] - exact[role] for role in ("input_speed", "output_speed"))
     assert abs(np.corrcoef(a, b)[0, 1]) < 0.05
-
-
-def test_removing_a_sensor_leaves_the_noise_of_those_before_it() -> None:
-    full, short = (
-        load_scenario("paper"),
-        replace(load_scenario("paper"), sensors=load_scenario("paper").sensors[:-1]),
-    )
-    for one, two in zip(run(full).channels[:-1], run(short).channels, strict=True):
-        assert np.array_equal(one.values, two.values)
 
 
 def test_ideal_sensors_show_the_trajectory() -> None:

@@ -4,24 +4,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.plant import build_form, build_plant
-from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.plant import build_plant
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import ReductionError
-from drivetwin.gearbox import load_gearbox, reduce, solve_gear
-from drivetwin.simulation import driveline_run
-from drivetwin.simulation.driveline import OutputSide
-from drivetwin.simulation.dual_clutch import Signal, Trajectory
+from drivetwin.gearbox import load_gearbox, solve_gear
+from drivetwin.simulation.dual_clutch import Trajectory
 from tests.support.arrays import FloatArray
 
 
-def both(scenario: Scenario) -> tuple[Trajectory, Trajectory]:
+def both(scenario: Any) -> tuple[Trajectory, Trajectory]:
     """Whole gearbox and form on the same inputs."""
     whole = run(scenario, noise=0.0).trajectory
     form = run(replace(scenario, plant=None), noise=0.0).trajectory
@@ -43,21 +41,6 @@ def test_brake_drums_are_the_drums_of_the_form(name: ScenarioName, drum: float) 
         assert difference(whole.clutch_torque[element], form.clutch_torque[element]) < 1e-8
     times = [np.array([event.time for event in each.events]) for each in (whole, form)]
     assert np.abs(times[0] - times[1]).max() < 1e-9
-
-
-def test_the_drum_of_an_open_element_that_is_no_shift_element_breaks_the_form() -> None:
-    """C2 = R3 turns with both shafts; the form keeps its diagonal parts only."""
-    scenario = load_scenario(ScenarioName.GEARBOX)
-    assert scenario.plant is not None
-    box = scenario.plant.gearbox
-    heavy = build_plant(replace(box, inertias={**box.inertias, "R3-C2": 0.2}), scenario.plant.gears)
-    assert "R3-C2" in [each.member for each in reduce(heavy.gearbox, "2", "3").violations]
-    light = scenario.model
-    form = build_form(heavy, light.J1, light.eta, OutputSide.from_model(light))
-    assert form.J_out > light.J_out
-    assert form.J2e > light.J2e
-    whole, reduced = both(replace(scenario, model=form, plant=heavy))
-    assert 0.001 < difference(whole.shaft_torque, reduced.shaft_torque) < 0.2
 
 
 def test_inertia_of_a_gear_is_the_kinetic_energy_of_its_members() -> None:
@@ -86,13 +69,3 @@ def test_what_is_simulated_starts_without_a_jerk() -> None:
 def test_double_transitions_have_no_plant() -> None:
     with pytest.raises(ReductionError, match="not one element off and one on"):
         build_plant(load_gearbox("three-set-4000cr"), ("2", "5"))
-
-
-def test_a_form_is_a_driveline_that_runs() -> None:
-    scenario = load_scenario(ScenarioName.GEARBOX)
-    time = np.linspace(0.0, 0.2, 21)
-    held = {name: Signal(time, np.full(21, 1e6)) for name in ("C4", "C3")}
-    held["C3"] = Signal(time, np.zeros(21))
-    torque = Signal(time, np.full(21, 1545.0))
-    result = driveline_run.simulate(scenario.model, torque, held, scenario.start(), time)
-    assert result.status == "completed"

@@ -9,7 +9,6 @@ import pytest
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.dyno.truth import compute_lockup_oscillation
 from drivetwin.errors import InputError
 
 DUAL = (ScenarioName.PAPER, ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS)
@@ -80,8 +79,7 @@ def test_lockup_oscillation_rings_at_its_closed_form_frequency(bench: DynoRun) -
     t, y = time[ring], torque[ring] - np.mean(torque[time > lockup + 1.2])
     rising = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
     crossings = t[rising] - y[rising] * (t[rising + 1] - t[rising]) / (y[rising + 1] - y[rising])
-    scenario = bench.scenario
-    frequency, _ = compute_lockup_oscillation(scenario.model, scenario.get_ratio(scenario.oncoming))
+    frequency = bench.truth.parameters[f"f_d_{bench.truth.shifts[0].end_gear}"]
     assert 1.0 / np.mean(np.diff(crossings)) == pytest.approx(frequency, rel=0.02)
 
 
@@ -105,3 +103,47 @@ def test_every_name_has_a_scenario_of_that_name() -> None:
 def test_a_drum_needs_a_gearbox(name: str, drum: float) -> None:
     with pytest.raises(InputError, match="gearbox, gearbox_chain"):
         load_scenario(ScenarioName(name), drum)
+
+
+@pytest.mark.parametrize("scenario", ["power_on_down", "power_off_down"])
+def test_a_downshift_brings_the_engine_up(scenario: str) -> None:
+    made = run(load_scenario(scenario), noise=0.0)
+    (shift,), motion = made.truth.shifts, made.trajectory
+    assert (shift.start_gear, shift.end_gear) == ("3", "2")
+    start, end = shift.inertia_start or 0.0, shift.lockup or 0.0
+    speeds = np.interp([start, end], motion.time, motion.engine_speed)
+    assert speeds[1] > 1.05 * speeds[0]
+    if scenario == "power_on_down":  # the element that lets go carries the torque
+        middle = start + 0.4
+        torques = {n: np.interp(middle, motion.time, t) for n, t in motion.clutch_torque.items()}
+        assert torques["B3"] > 50.0
+        assert torques["B2"] == 0.0
+
+
+def test_with_the_power_off_the_engine_falls_before_the_upshift_takes_hold() -> None:
+    made = run(load_scenario("power_off_up"), noise=0.0)
+    assert (made.truth.torque_start or 0.0) > (made.truth.inertia_start or 0.0) > 0.0
+    assert made.scenario.compute_torque(np.array([2.2]))[0] < 0.0
+
+
+def test_an_input_gear_stands_between_engine_and_gearbox() -> None:
+    made = run(load_scenario("input_gear"), noise=0.0)
+    speed = next(c for c in made.channels if c.role == "input_speed")
+    expected = np.interp(speed.time, made.trajectory.time, made.trajectory.engine_speed) / 1.2
+    assert speed.values == pytest.approx(expected, rel=1e-9)
+    assert made.truth.parameters["J_prime_2"] > 0.85 * 17.0 + 2.2
+
+
+def test_the_dual_clutch_gearbox_hands_over_without_a_gap_and_the_manual_one_with() -> None:
+    made = run(load_scenario("dual_clutch"), noise=0.0)
+    motion = made.trajectory
+    start, end = made.truth.torque_start or 0.0, made.truth.lockup or 0.0
+    between = (motion.time > start) & (motion.time < end)
+    assert motion.shaft_torque[between].mean() > 300.0
+    made = run(load_scenario("manual"), noise=0.0)
+    (pressure,) = [one for one in made.channels if one.role.startswith("pressure.")]
+    open_ = (pressure.time > 2.35) & (pressure.time < 2.60)
+    assert pressure.values[open_].max() < 1e4 < 1e6 < pressure.values[[0, -1]].min()
+    motion = made.trajectory
+    gap = (motion.time > 2.45) & (motion.time < 2.60)
+    assert np.abs(motion.shaft_torque[gap]).max() < 5.0
