@@ -12,7 +12,6 @@ import drivetwin
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.result.method import Method
@@ -66,7 +65,8 @@ def by_the_paper() -> Identification:
 
 def slowed(found: Identification) -> Identification:
     """The same, if its residuals were those of sensors behind a filter of some 20 ms."""
-    fit, _ = get_likelihood_fit(found)
+    fit = found.evidence.likelihood
+    assert fit is not None
     rng = np.random.default_rng(2)
     residuals = tuple(
         term.record.sigma * lfilter([np.sqrt(0.19)], [1.0, -0.9], rng.normal(size=term.record.size))

@@ -125,14 +125,18 @@ def _sample_signals(made: DynoRun) -> ShiftSignals:
 
 
 def read_run(
-    made: DynoRun, mapping: str = "", P0_std: float | None = None, **stated: Any
+    made: DynoRun,
+    mapping: str = "",
+    P0_std: float | None = None,
+    name: str = "log",
+    **stated: Any,
 ) -> tuple[ShiftLog, VehicleCard]:
     """Write a run to files and read its log and card; `stated` replaces fields of the card.
 
     `mapping` is the text of a channel mapping; with `P0_std` the card leaves P0 that spread [Pa].
     """
     with tempfile.TemporaryDirectory() as folder:
-        log_file, card_file, _ = write_run(Path(folder) / "log.csv", made)
+        log_file, card_file, _ = write_run(Path(folder) / f"{name}.csv", made)
         card = replace(drivetwin.load_card(card_file), **stated)
         if P0_std is not None:
             elements = {
@@ -147,5 +151,5 @@ def read_run(
 
 def identify_run(made: DynoRun, P0_std: float | None = None, **stated: Any) -> Identification:
     """Identify the log of a run by its card, of which `stated` replaces fields."""
-    log, card = read_run(made, "", P0_std, **stated)
+    log, card = read_run(made, P0_std=P0_std, **stated)
     return drivetwin.identify(log, card, drivetwin.detect_shifts(log, card))

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.analysis.friction_shape import BENDS, fit_friction_shape, project_shape
+from drivetwin.estimation.analysis.friction_shape import fit_friction_shape, project_shape
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
-from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.asked import by_the_paper, stepped
+from tests.support import bench
 
-NO_EFFECT = EffectPriors({effect: EffectPrior(0.0) for effect in EffectId})
+NO_EFFECT = EffectPriors(bench.NO_EFFECT)
 
 
 def test_free_shape_holds_the_truth() -> None:
@@ -36,7 +36,7 @@ def test_free_shape_holds_the_truth() -> None:
     assert curve.stribeck is None
     # The Stribeck law is the truth: a dozen knots gain no more than their number.
     assert -3.0 < one.gain < 20.0
-    assert one.bend in BENDS
+    assert one.bend > 0.0
 
 
 def test_falling_shape_falls_and_sensors_and_effects_widen_its_band() -> None:
@@ -70,7 +70,7 @@ def test_other_methods_are_refused() -> None:
         fit_friction_shape(by_the_paper(), FrictionShape.FREE, NO_EFFECT)
 
 
-@settings(max_examples=40)
+@settings(max_examples=10)
 @given(
     st.integers(0, 10_000),
     st.integers(2, 8),

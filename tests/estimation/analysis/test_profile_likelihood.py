@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError, InputError
-from drivetwin.estimation.analysis.profile_likelihood import compute_profile, get_likelihood_fit
+from drivetwin.estimation.analysis.profile_likelihood import compute_profile
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from tests.estimation.asked import by_the_paper, slowed, stepped
 
@@ -33,7 +33,8 @@ def test_slow_errors_widen_it_like_the_covariance() -> None:
 def test_is_the_least_cost_with_the_parameter_held() -> None:
     """Jo′ acts through the locks, not quite linearly; held by a hard prior Q is searched anew."""
     one = compute_profile(stepped(), "J_out")
-    fit, _ = get_likelihood_fit(stepped())
+    fit = stepped().evidence.likelihood
+    assert fit is not None
     place = fit.point.names.index("J_out")
     for k in (1, -2):
         held = replace(
@@ -65,13 +66,10 @@ def test_refuses_what_does_not_move(name: str, match: str) -> None:
         compute_profile(stepped(), name)
 
 
-def test_refuses_other_methods() -> None:
+def test_refuses_other_methods_and_says_why_a_fit_failed() -> None:
     with pytest.raises(IdentificationError, match="paper method"):
         compute_profile(by_the_paper(), "eta")
-
-
-def test_of_a_search_that_was_given_up_it_is_told_why() -> None:
     evidence = replace(by_the_paper().evidence, gave_up="the work ran out")
     with pytest.raises(IdentificationError, match=r"fit of this log failed.+ the work ran") as told:
-        get_likelihood_fit(replace(by_the_paper(), evidence=evidence))
+        compute_profile(replace(by_the_paper(), evidence=evidence), "eta")
     assert "--method likelihood" not in told.value.remedy

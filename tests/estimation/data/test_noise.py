@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Noise levels found in a signal that itself moves."""
+"""Noise and rounding of a signal, against what was put in."""
 
 from __future__ import annotations
 
@@ -7,9 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from drivetwin._util.signal_processing import estimate_rounding_step
-from drivetwin.estimation.data.noise import estimate_white_noise
+from drivetwin.estimation.data.noise import estimate_quantization_error, estimate_white_noise
+from drivetwin.estimation.data.shift_data import MeasuredSignal
+from tests.support.arrays import FloatArray
+
+STEP = 12.5
+"""Rounding step of an engine torque on a bus [N m]."""
 
 
 def test_noise_is_found_under_a_driveline_oscillation_and_a_step() -> None:
@@ -34,6 +40,59 @@ def test_a_rounding_step_is_found_where_ramps_alone_move_the_signal() -> None:
     ramps = [np.linspace(a, b, 7)[:-1] for a, b in pairwise(levels)]
     values = np.concatenate([np.append(np.full(20, ramp[0]), ramp) for ramp in ramps])
     rounded = 11.0 * np.round(values / 11.0)
-    jumps = np.abs(np.diff(rounded))
-    assert jumps[jumps > 0.0].min() > 11.0
     assert estimate_rounding_step(rounded) == pytest.approx(11.0)
+
+
+def read_levels(rng: np.random.Generator, levels: FloatArray, noise: float) -> MeasuredSignal:
+    """Read 100 samples at each level with `noise`, rounded to `STEP`."""
+    true = np.repeat(levels, 100)
+    values = STEP * np.round((true + noise * rng.standard_normal(true.size)) / STEP)
+    time = np.linspace(0.0, 0.01 * true.size, true.size)
+    return MeasuredSignal(time, values, float(np.hypot(noise, STEP / 3.46)))
+
+
+def compute_mean_error(level: FloatArray, noise: float) -> FloatArray:
+    """Compute the mean of what is read less the level, summed over the codes by SciPy's normal."""
+    near = np.round(level / STEP)[:, None] + np.arange(-8, 9)
+    edges = (near[:, :, None] + [-0.5, 0.5]) * STEP - level[:, None, None]
+    chance = np.diff(norm.cdf(edges, scale=noise), axis=2)[:, :, 0]
+    return np.asarray(np.sum(chance * near, axis=1) * STEP - level)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.15, 0.25, 0.35])
+def test_the_error_of_drawn_levels_has_the_estimated_size(share: float) -> None:
+    rng = np.random.default_rng(5)
+    score = []
+    for _ in range(40):
+        levels = rng.uniform(600.0, 1900.0, 6)
+        estimated = estimate_quantization_error(read_levels(rng, levels, share * STEP), STEP)
+        score.append(compute_mean_error(levels, share * STEP) / estimated)
+    assert 0.6 < np.sqrt(np.mean(np.square(score))) < 1.2
+
+
+def test_without_noise_the_error_of_a_level_is_uniform() -> None:
+    rng = np.random.default_rng(6)
+    signal = read_levels(rng, rng.uniform(600.0, 1900.0, 12), 0.0)
+    assert estimate_quantization_error(signal, STEP) == pytest.approx(STEP / np.sqrt(12.0), rel=0.1)
+
+
+def test_levels_on_a_code_show_their_noise_where_differences_do_not() -> None:
+    """Noise of 0.35 steps at levels that are codes: few samples leave their code, so that their
+    differences seem to hold rounding alone, and yet the counts show the noise."""
+    rng = np.random.default_rng(7)
+    signal = read_levels(rng, STEP * np.arange(100.0, 112.0), 0.35 * STEP)
+    assert estimate_quantization_error(signal, STEP) < 0.06 * STEP
+
+
+@pytest.mark.parametrize("noise", [0.7 * STEP, 3.0 * STEP])
+def test_noise_that_dithers_leaves_little(noise: float) -> None:
+    rng = np.random.default_rng(8)
+    signal = read_levels(rng, rng.uniform(600.0, 1900.0, 12), noise)
+    assert estimate_quantization_error(signal, STEP) < 0.02 * STEP
+
+
+def test_a_signal_that_rests_nowhere_has_no_mean_error() -> None:
+    time = np.linspace(0.0, 3.0, 300)
+    ramp = STEP * np.round(2000.0 * time / STEP)
+    assert estimate_quantization_error(MeasuredSignal(time, ramp, 4.0), STEP) == 0.0
+    assert estimate_quantization_error(MeasuredSignal(time, ramp, 4.0), 0.0) == 0.0

@@ -3,22 +3,18 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
+from typing import Any
 
 import drivetwin
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.estimation.asked import DURATION
+from tests.support.bench import read_run
 from tests.support.shared_results import shared
 
 LEVEL = 0.85
@@ -27,31 +23,27 @@ LOADS = (2300.0, 2000.0)
 """T_v/i_f [N m] of both."""
 
 
-def scenario(level: float = 1.0, load: float = LOADS[0], payload: float = 1.0) -> Scenario:
+def scenario(level: float = 1.0, load: float = LOADS[0], payload: float = 1.0) -> Any:
     """The paper's vehicle with throttle steps; `payload` multiplies the vehicle's inertia."""
     base = load_scenario("paper_steps")
-    torque = Program(tuple((time, level * value) for time, value in base.engine_torque.knots))
+    knots = tuple((time, level * value) for time, value in base.engine_torque.knots)
+    torque = replace(base.engine_torque, knots=knots)
     model = replace(
         base.model, load=RoadLoad(constant=load * base.model.i_f), J_v=payload * base.model.J_v
     )
     return replace(base, model=model, engine_torque=torque, duration=DURATION)
 
 
-def source(made: Scenario, seed: int, held: frozenset[int] = frozenset()) -> Source:
+def source(made: Any, seed: int, held: frozenset[int] = frozenset()) -> Source:
     """A log of the scenario with its shifts; named after the seed."""
-    with tempfile.TemporaryDirectory() as folder:
-        file, card_file, _ = write_run(Path(folder) / f"log{seed}.csv", run(made, seed=seed))
-        card = drivetwin.load_card(card_file)
-        log = drivetwin.read_log(file, card)
-    return Source(log, require_shifts(log, card), held)
+    log, _ = read_run(run(made, seed=seed), name=f"log{seed}")
+    return Source(log, drivetwin.detect_shifts(log, card()), held)
 
 
 @cache
 def card() -> VehicleCard:
     """The card of all of them."""
-    with tempfile.TemporaryDirectory() as folder:
-        _, file, _ = write_run(Path(folder) / "any.csv", run(scenario(), seed=0))
-        return drivetwin.load_card(file)
+    return read_run(run(scenario(), seed=0), name="any")[1]
 
 
 @shared

@@ -8,9 +8,6 @@ import re
 import numpy as np
 import pytest
 
-from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.linear.estimates import estimate_systematic_std
-from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.verdict import (
     assess,
@@ -21,9 +18,7 @@ from drivetwin.estimation.result.verdict import (
     refuse_parameter,
 )
 from drivetwin.parameters import SPECS
-from drivetwin.vehicle.spec import PriorValue, SensorTolerance
-from tests.estimation.synthetic import Run, Truth
-from tests.support.arrays import FloatArray
+from drivetwin.vehicle.spec import PriorValue
 
 
 @pytest.mark.parametrize(
@@ -105,21 +100,6 @@ def test_propagation_is_exact_for_a_linear_map() -> None:
 def test_correlation_of_a_known_parameter_is_zero() -> None:
     matrix = compute_correlation(np.array([[4.0, 0.0], [0.0, 0.0]]))
     assert matrix.tolist() == [[1.0, 0.0], [0.0, 1.0]]
-
-
-def test_engine_torque_gain_error_shows_in_eta_alone(stepped: Run) -> None:
-    driveline = Truth().driveline()
-
-    def values(signals: ShiftSignals) -> FloatArray:
-        found = identify_shift(signals, driveline, 12.0)
-        told = dict(zip(found.ids, found.values, strict=True))
-        return np.array([told["eta"], told["J_prime_2"], told["Tv_over_if"]])
-
-    tolerance = {"engine_torque": SensorTolerance(gain=0.03)}
-    std = estimate_systematic_std(values, stepped.signals(), tolerance)
-    assert std[0] == pytest.approx(0.85 * (1 - 1 / 1.03), rel=0.01)
-    assert std[1] < 1e-3 * 17.5
-    assert std[2] == 0.0
 
 
 @pytest.mark.parametrize("share", [0.3, 0.99])
