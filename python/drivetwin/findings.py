@@ -101,6 +101,7 @@ class Code(StrEnum):
     CARD_SUSPECT = auto()
     RESIDUAL_UNEXPLAINED = auto()
     RESIDUAL_ABOVE_NOISE = auto()
+    SEARCH_LIMITED = auto()
     EFFECT_FOUND = auto()
     EFFECT_IN_PLANT = auto()
     EFFECT_POSSIBLE = auto()

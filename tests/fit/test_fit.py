@@ -12,6 +12,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code
+from drivetwin.fit import search
 from drivetwin.fit.fit import build_problem, fit_network
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Measured, Recording
@@ -218,6 +219,21 @@ def test_a_model_without_the_play_is_not_valid_and_identifies_nothing() -> None:
     codes = {one.code for one in found.findings}
     assert Code.RESIDUAL_UNEXPLAINED in codes
     assert all(one.verdict is not Verdict.IDENTIFIED for one in found.estimates.values())
+
+
+def test_a_search_without_explanation_ends_at_its_work_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = make_log(ModelName.ENGINE_START)
+    outputs = {
+        name: replace(one, values=one.values * (1.0 + 0.02 * np.sin(19.0 * one.time)))
+        for name, one in made.recording.outputs.items()
+    }
+    monkeypatch.setattr(search, "FIT_SEARCH", replace(search.FIT_SEARCH, work=200.0))
+    found = fit_network(made.model, [replace(made.recording, outputs=outputs)])
+    assert Code.SEARCH_LIMITED in {one.code for one in found.findings}
+    assert found.status is ModelStatus.NOT_VALID
+    assert 1 <= len(found.starts) < 8  # four rounds of two starts without the limit
 
 
 def test_a_coast_down_needs_no_input() -> None:

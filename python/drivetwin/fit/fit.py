@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -38,6 +39,9 @@ from drivetwin.simulation.network import make_input
 
 _DELAY_REACH = 5.0
 """Standard deviations of its prior by which a delay may be off."""
+_LARGEST_STEP = math.log(10.0)
+"""Largest change of the logarithm of a positive number in one step of the search: an expansion does
+not hold over more than a decade, and a run with a damping of 1e11 takes seconds."""
 _USUAL_DELAY = 0.05
 """Reach of a delay without prior or bounds [s]."""
 
@@ -125,7 +129,9 @@ def build_problem(
         term.simulate(point)  # raises InputError for a start or output that the network lacks
     for recording in recordings:
         _require_used(model, recording)
-    return LikelihoodObjective(tuple(terms), prior, lower, upper), point, sought
+    reach = np.full(len(found.names), np.inf)
+    reach[: len(sought)] = [_LARGEST_STEP if one.is_positive else np.inf for one in sought]
+    return LikelihoodObjective(tuple(terms), prior, lower, upper, reach), point, sought
 
 
 def _build_plant(

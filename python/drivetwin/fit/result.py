@@ -213,7 +213,8 @@ def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMi
     agreement = tuple(term.compare(minimum.point) for term in problem.terms)
     failures = tuple(find_failures(problem.terms, minimum.normal.residuals, agreement, chi2))
     doubts = find_doubts(problem.terms, agreement, failures, chi2)
-    findings = (*failures, *doubts, *_collect_findings(minimum, sought))
+    ended = [report(Code.SEARCH_LIMITED, starts=len(found.starts))] if found.is_limited else []
+    findings = (*failures, *ended, *doubts, *_collect_findings(minimum, sought))
     estimates = apply_errors(estimates, findings)
     return ModelFit(
         model,

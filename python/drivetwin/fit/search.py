@@ -9,6 +9,7 @@ draws from the priors side by side; only the best are refined.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.gauss_newton import (
     GaussNewtonSettings,
@@ -55,6 +57,9 @@ class FitSearchSettings:
     """Q over that of the best start from which a search is given up after its first steps [-]."""
     same_cost: float = 2.0
     """Difference of Q up to which two starts have led to the same minimum [-]."""
+    work: float = 1000.0
+    """Work of all starts: 3 to 8 times that of the starts of a recording that the model explains
+    [passes]."""
     max_input_rounds: int = 4
     """Largest number of successive minima over the inputs [count]."""
     min_input_decrease: float = 5.0
@@ -78,10 +83,14 @@ class RefinedStart:
 
 @dataclass(frozen=True, eq=False)
 class FoundMinimum:
-    """Best minimum, and all that were reached, in the order of their starts."""
+    """Best minimum, and all that were reached, in the order of their starts.
+
+    `is_limited` is True if the work limit ended the search before a start explained the recordings.
+    """
 
     result: OptimizeResult[Problem]
     starts: tuple[RefinedStart, ...]
+    is_limited: bool
 
     @property
     def agreeing(self) -> int:
@@ -115,12 +124,13 @@ def search(
     coarse = _coarsen(problem)
     attempts = _Attempts(coarse)
     screen = _Screen(coarse, start, sought, np.random.default_rng(seed))
-    for number in range(FIT_SEARCH.rounds):
-        with scale_progress(0.14 * number, 0.14 * (number + 1)):
-            for candidate in screen.draw(number):
-                attempts.refine(candidate)
-        if attempts.starts and attempts.explains:
-            break
+    with suppress(BudgetExceeded), limit_evaluations(FIT_SEARCH.work) as budget:
+        for number in range(FIT_SEARCH.rounds):
+            with scale_progress(0.14 * number, 0.14 * (number + 1)):
+                for candidate in screen.draw(number):
+                    attempts.refine(candidate)
+            if attempts.starts and attempts.explains:
+                break
     if not attempts.starts:
         raise IdentificationError(
             "the simulation could not be brought onto the recordings from any start",
@@ -128,7 +138,9 @@ def search(
         )
     with scale_progress(0.58, 1.0):
         best = _polish(problem, attempts.best.point)
-        return FoundMinimum(_expect_inputs(best), tuple(attempts.starts))
+        is_limited = budget.left < 0.0
+        best = best if is_limited else _expect_inputs(best)
+        return FoundMinimum(best, tuple(attempts.starts), is_limited)
 
 
 def _coarsen(problem: Problem) -> Problem:

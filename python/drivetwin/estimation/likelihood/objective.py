@@ -108,12 +108,16 @@ T = TypeVar("T", bound=Term)
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodObjective(Generic[T]):
-    """Likelihood of all terms, with prior and bounds `lower`, `upper` (p,) of their unknowns."""
+    """Likelihood of all terms, with prior and bounds `lower`, `upper` (p,) of their unknowns.
+
+    `reach` is the largest change of an unknown in one step.
+    """
 
     terms: tuple[T, ...]
     prior: Prior
     lower: FloatArray
     upper: FloatArray
+    reach: FloatArray | float = np.inf
 
     @property
     def size(self) -> int:
@@ -150,8 +154,8 @@ class LikelihoodObjective(Generic[T]):
         return total
 
     def retract(self, point: ParameterVector, step: FloatArray) -> FloatArray:
-        """Compute the values (p,) after a `step` (p,)."""
-        return np.asarray(point.values + step)
+        """Compute the values (p,) after a `step` (p,), which is cut at the reach."""
+        return np.asarray(point.values + np.clip(step, -self.reach, self.reach))
 
     def compute_curvature(
         self, point: ParameterVector, normal: NormalEquations, step: FloatArray, share: float
