@@ -3,27 +3,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import drivetwin
-from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.observer.inputs import collect_recorded, is_driving
 from tests.observer.conftest import brief
+from tests.support.bench import read_run
 
 
 @pytest.mark.parametrize("name", [ScenarioName.POWER_OFF_UP, ScenarioName.POWER_OFF_DOWN], ids=str)
-def test_power_flows_by_the_torque_at_the_gears(name: ScenarioName, tmp_path: Path) -> None:
+def test_power_flows_by_the_torque_at_the_gears(name: ScenarioName) -> None:
     """T_g = T_e - J1·ω_e': in a power-off upshift the engine drives although T_e is negative."""
     bench = run(load_scenario(name), seed=1)
-    file, card_file, _ = write_run(tmp_path / "log.csv", bench)
-    card = drivetwin.load_card(card_file)
-    log = drivetwin.read_log(file, card)
+    log, card = read_run(bench)
     shift = brief(log, card)
     model, motion = bench.scenario.model, bench.trajectory
     seen = collect_recorded(log, shift, card.i_in.value)

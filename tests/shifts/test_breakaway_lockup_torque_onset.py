@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,7 +10,6 @@ from numpy.typing import NDArray
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import format_card
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.shifts.breakaway_lockup import (
@@ -21,7 +18,7 @@ from drivetwin.shifts.breakaway_lockup import (
     smooth_channel,
 )
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.vehicle.card import load_card
+from tests.support.bench import read_run
 
 _TIME = np.arange(0.0, 1.0, 1e-3)
 _SPAN = (0.0, 1.0)
@@ -81,13 +78,12 @@ def test_a_fall_of_the_engine_torque_before_is_not_taken_for_the_shift() -> None
     "name", [ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS, ScenarioName.GEARBOX_CHAIN]
 )
 def test_without_pressures_the_output_torque_tells_the_onset(
-    name: ScenarioName, tmp_path: Path
+    name: ScenarioName,
 ) -> None:
     bench = run(load_scenario(name), seed=0)
-    (tmp_path / "card.toml").write_text(format_card(bench.scenario))
     roles = ("engine_torque", "output_torque", "input_speed", "output_speed")
     channels = {one.role: one for one in bench.channels if one.role in roles}
-    found = detect_shifts(ShiftLog(channels, "made", ""), load_card(tmp_path / "card.toml"))
+    found = detect_shifts(ShiftLog(channels, "made", ""), read_run(bench)[1])
     assert len(found.shifts) == len(bench.truth.shifts)
     for shift, true in zip(found.shifts, bench.truth.shifts, strict=True):
         assert true.torque_start is not None

@@ -9,14 +9,12 @@ import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
+from tests.support.bench import read_run
 
 KINDS = {
     ScenarioName.PAPER_STEPS: ShiftKind.POWER_ON_UP,
@@ -27,15 +25,8 @@ KINDS = {
 
 
 @pytest.fixture(scope="module", params=KINDS)
-def recording(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[ShiftLog, VehicleCard, ShiftKind]:
-    bench = run(load_scenario(request.param), seed=2)
-    folder = tmp_path_factory.mktemp("kind")
-    (folder / "log.csv").write_text(format_log(bench))
-    (folder / "card.toml").write_text(format_card(bench.scenario))
-    card = load_card(folder / "card.toml")
-    return read_log(folder / "log.csv", card), card, KINDS[request.param]
+def recording(request: pytest.FixtureRequest) -> tuple[ShiftLog, VehicleCard, ShiftKind]:
+    return *read_run(run(load_scenario(request.param), seed=2)), KINDS[request.param]
 
 
 def test_kind_and_phases_hold_without_pressures_and_torque_sensor(
