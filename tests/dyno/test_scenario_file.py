@@ -94,11 +94,6 @@ def test_torque_reduction_shortens_the_inertia_phase() -> None:
     assert cut.truth.lockup < plain.truth.lockup - 0.02
 
 
-def test_every_name_has_a_scenario_of_that_name() -> None:
-    for name in ScenarioName:
-        assert load_scenario(name).name == name
-
-
 @pytest.mark.parametrize(("name", "drum"), [("paper", 0.05), ("gearbox", -0.1)])
 def test_a_drum_needs_a_gearbox(name: str, drum: float) -> None:
     with pytest.raises(InputError, match="gearbox, gearbox_chain"):

@@ -44,12 +44,6 @@ def test_what_the_log_contradicts_is_told() -> None:
     assert len(warnings) == 1
 
 
-def test_a_value_of_something_else_changes_nothing() -> None:
-    values, covariance, _ = add_priors(IDS, VALUES, COVARIANCE, {"J_out": PriorValue(1.0)})
-    assert np.array_equal(values, VALUES)
-    assert np.array_equal(covariance, COVARIANCE)
-
-
 @given(
     st.floats(0.05, 0.2), st.floats(5e4, 1.2e5), st.floats(-0.9, 0.9),
     st.floats(1e3, 6e4), st.floats(2e4, 1e6),
