@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.result.estimate_set import JointCovariance
-from drivetwin.parameters import LAW_KEYS, make_law_id
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.distribution import describe_model
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.spec import PARTNER_LEVEL_STD, PriorValue
+from drivetwin.vehicle.spec import PriorValue
 from tests.report.sample import SHIFT, STRIBECK, card, identification
 
 IDS = ("eta", "P0.B3")
+LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
+PARTNER_LEVEL_STD = 0.07
+"""Stated spread of the friction of an element relative to its partner's."""
 LAW_STD = np.array([2e-3, 3e-3, 1e-5, 0.1])
 CORRELATION = -0.9
 """Of μ_c and P0: a higher P0 goes with a higher friction or a lower one."""
@@ -30,7 +32,7 @@ def make_twin() -> Twin:
     scale = np.concatenate([stds, LAW_STD])
     correlation = np.eye(scale.size)
     correlation[1, 2] = correlation[2, 1] = CORRELATION
-    ids = (*IDS, *(make_law_id("B3", key) for key in LAW_KEYS))
+    ids = (*IDS, *(f"{key}.B3" for key in LAW))
     joint = JointCovariance(ids, np.outer(scale, scale) * correlation)
     return build_twin(replace(found, joint=joint), card())
 
@@ -76,7 +78,7 @@ def test_a_drawn_friction_has_no_spread_of_the_gain() -> None:
 def test_friction_is_drawn_with_what_it_is_correlated_with() -> None:
     twin = make_twin()
     twin = replace(twin, friction={**twin.friction, "B2": twin.friction["B3"]})
-    ids = (*twin.covariance_ids, *(make_law_id("B2", key) for key in LAW_KEYS))
+    ids = (*twin.covariance_ids, *(f"{key}.B2" for key in LAW))
     assert twin.covariance is not None
     size = len(twin.covariance_ids)
     wide = np.zeros((len(ids), len(ids)))
