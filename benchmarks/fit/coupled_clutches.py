@@ -17,6 +17,7 @@ from benchmarks.fit.report import format_header, format_row
 from benchmarks.fit.study import HALF
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
+from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.model import Model
@@ -156,5 +157,7 @@ def _fit_noisy(
     wanted: dict[str, Output] = {f"w{k}": ("speed", f"J{k}") for k in (1, 2, 3, 4)}
     model = build_model(means, inputs)
     drive = {"drive": inputs["drive"]}  # the forces are exact: as inputs of the model they stay so
-    found = model.fit([Recording(drive, outputs, known)], unknowns, wanted, seed=0)
+    exact = {one.name: Tolerance(exact=True) for one in model.components}
+    recording = Recording(drive, outputs, known)
+    found = model.fit([recording], unknowns, wanted, tolerances=exact, seed=0)
     return {name: (found.values[name], found.std[name]) for name in TRUTH}

@@ -29,6 +29,7 @@ from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.component import Component
@@ -125,9 +126,10 @@ def _fit_network(
     measured = {ENGINE_TORQUE: signals.engine_torque, **signals.pressures}
     inputs = {name: Signal(one.time, one.values) for name, one in measured.items()}
     unknowns = _build_unknowns(bench, dual, start)
-    found = _build_model(bench, dual, start, inputs).fit(
-        [Recording(inputs, outputs)], unknowns, OUTPUTS, seed=0
-    )
+    model = _build_model(bench, dual, start, inputs)
+    exact = {one.name: Tolerance(exact=True) for one in model.components}
+    recording = Recording(inputs, outputs)
+    found = model.fit([recording], unknowns, OUTPUTS, tolerances=exact, seed=0)
     values = np.array([found.values[name] for name in unknowns])
     std = np.array([found.std[name] for name in unknowns])
     covariance = found.correlation * np.outer(std, std)

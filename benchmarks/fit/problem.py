@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.fit.fixed_numbers import CopiedElements, FixedNumber, list_fixed, make_plain
 from drivetwin.modeling.component import Component
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.model_components import Place
@@ -53,13 +54,15 @@ class Realisation:
     """Recording with noise, and the prior means that were drawn about the truth.
 
     `inputs` are signals as measured, `outputs` are columns (n,), `start` are values by node or
-    shaft.
+    shaft. `moves` are the deviations of the stated fixed numbers from the true ones, in standard
+    deviations; None where all are exact.
     """
 
     inputs: Mapping[str, Signal]
     outputs: Mapping[str, FloatArray]
     means: Values
     start: Values
+    moves: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +88,17 @@ class Problem:
     def truth(self) -> dict[str, float]:
         """True values by unknown."""
         return {name: one.truth for name, one in self.unknowns.items()}
+
+    @property
+    def paths(self) -> set[str]:
+        """Paths of the unknowns."""
+        return {path for one in self.unknowns.values() for path in one.paths}
+
+    @property
+    def fixed(self) -> list[FixedNumber]:
+        """True numbers that are neither unknown nor exact."""
+        elements = [component.element for component in self.build().components]
+        return list_fixed(make_plain(elements), self.paths, {})
 
     @property
     def records(self) -> list[Output]:
@@ -170,6 +184,18 @@ def record(problem: Problem, rng: np.random.Generator) -> Realisation:
         if kind == "speed" and node in start and node not in problem.known:
             start[node] += sensor.sigma * float(rng.standard_normal())
     return Realisation(inputs, dict(zip(problem.outputs, noisy, strict=True)), means, start)
+
+
+def move_fixed(problem: Problem, model: Model, moves: FloatArray) -> None:
+    """Move the fixed numbers of a model from the true to the stated values."""
+    elements = CopiedElements(make_plain([one.element for one in model.components]))
+    for one, move in zip(problem.fixed, moves.tolist(), strict=True):
+        for place in one.places:
+            elements.put(place, one.move(elements.get(place), move))
+    model.components = [
+        replace(one, element=element)
+        for one, element in zip(model.components, elements.listed, strict=True)
+    ]
 
 
 def draw_means(problem: Problem, rng: np.random.Generator) -> dict[str, float]:

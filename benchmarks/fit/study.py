@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,11 +16,13 @@ from benchmarks.fit.problem import (
     Realisation,
     Values,
     compute_prior_std,
+    move_fixed,
     record,
 )
 from benchmarks.fit.problems import build_problem
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import DrivetwinError
+from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
 
@@ -65,7 +67,12 @@ class Try:
 
 
 def run_study(
-    name: str, seeds: Sequence[int], workers: int = 1, *, sigmas_known: bool = True
+    name: str,
+    seeds: Sequence[int],
+    workers: int = 1,
+    *,
+    sigmas_known: bool = True,
+    mismatch: bool = False,
 ) -> list[Try]:
     """Fit the realisations of `seeds` of a problem; the result is independent of `workers`.
 
@@ -79,23 +86,25 @@ def run_study(
         Number of processes.
     sigmas_known
         Whether the fit is given the noise of the outputs; otherwise it estimates it.
+    mismatch
+        Whether the errors of all fixed numbers are drawn from their distributions.
 
     Returns
     -------
     list of Try
         Outcomes in the order of the seeds.
     """
-    task = partial(fit_once, name, sigmas_known=sigmas_known)
+    task = partial(fit_once, name, sigmas_known=sigmas_known, mismatch=mismatch)
     if workers == 1:
         return [task(seed) for seed in seeds]
     with ProcessPoolExecutor(workers) as pool:
         return list(pool.map(task, seeds))
 
 
-def fit_once(name: str, seed: int, *, sigmas_known: bool = True) -> Try:
+def fit_once(name: str, seed: int, *, sigmas_known: bool = True, mismatch: bool = False) -> Try:
     """Draw the realisation of a seed, fit it, and fit it once more from the truth."""
     problem = build_problem(name)
-    drawn = draw(problem, seed)
+    drawn = draw(problem, seed, mismatch=mismatch)
     began = time.process_time()
     try:
         found = fit(problem, drawn, drawn.means, sigmas_known=sigmas_known)
@@ -117,9 +126,11 @@ def fit_once(name: str, seed: int, *, sigmas_known: bool = True) -> Try:
     )
 
 
-def draw(problem: Problem, seed: int) -> Realisation:
+def draw(problem: Problem, seed: int, *, mismatch: bool = False) -> Realisation:
     """Draw the realisation of a seed; other problems have other draws of the same seed."""
-    return record(problem, np.random.default_rng([seed, *problem.name.encode()]))
+    rng = np.random.default_rng([seed, *problem.name.encode()])
+    drawn = record(problem, rng)
+    return replace(drawn, moves=rng.standard_normal(len(problem.fixed))) if mismatch else drawn
 
 
 def fit(problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bool = True) -> Found:
@@ -153,7 +164,13 @@ def fit(problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bo
         for name, one in problem.unknowns.items()
     }
     wanted = {name: one.output for name, one in problem.outputs.items()}
-    found = model.fit([Recording(drawn.inputs, outputs, known)], unknowns, wanted, seed=0)
+    tolerances = {}
+    if drawn.moves is None:
+        tolerances = {one.name: Tolerance(exact=True) for one in model.components}
+    else:
+        move_fixed(problem, model, drawn.moves)
+    recording = Recording(drawn.inputs, outputs, known)
+    found = model.fit([recording], unknowns, wanted, tolerances=tolerances, seed=0)
     return Found(
         found.values,
         found.std,

@@ -147,6 +147,8 @@ class Code(StrEnum):
     MU_GAIN_SLIP = auto()
     RATIO_REFINED = auto()
     RATIO_OFF_CARD = auto()
+    FIXED_NUMBER_REFINED = auto()
+    FIXED_NUMBER_OFF = auto()
     GAIN_SUSPECT = auto()
     GAIN_ASSUMED = auto()
     MU_FOR_ASSUMED_GAIN = auto()

@@ -32,6 +32,12 @@ def test_the_file_has_the_numbers_of_the_fit() -> None:
         assert one.minimum == found.values[name]
         assert one.interval == pytest.approx(found.intervals[name])
         assert file.correlation[name][name] == pytest.approx(1.0)
+    assert list(file.fixed) == [one.number.name for one in found.moved]
+    gain = file.fixed["K0.gain"]
+    assert gain.stated == 0.01
+    assert gain.tolerance == pytest.approx(5e-4)
+    assert gain.source == "usual"
+    assert gain.widens.startswith("K0.friction.mu")
     assert len(file.starts) == len(found.starts)
     assert file.findings[0].code == Code.RECORDING
     assert [one.log for one in file.held_out] == ["other.csv"]

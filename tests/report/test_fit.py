@@ -31,6 +31,7 @@ def test_the_page_names_unknowns_logs_and_findings() -> None:
     page = render()
     for name in fit_log(ModelName.ENGINE_START).values:
         assert name in page
+    assert all(name in page for name in ("K0.gain", "K0.p0", "with the recordings"))
     assert "other.csv, held out" in page
     assert "a remark of the reader" in page
     assert "starts led to the best minimum" in page

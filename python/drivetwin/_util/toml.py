@@ -191,6 +191,8 @@ def format_value(value: Any) -> str:
             return f"[{', '.join(map(format_value, value))}]"
         case int():
             return repr(value)
+        case WrittenNumber():
+            return value.text
     return repr(float(value))
 
 

@@ -34,6 +34,21 @@ class UnknownRecord(ParameterRecord):
     interval: Interval
 
 
+class FixedRecord(Record):
+    """A number that is no unknown, SI: as `stated`, with its standard deviation `tolerance` and the
+    `source` of that; its value and standard deviation with the recordings; the unknown that it
+    widens most, and its share in the variance of that."""
+
+    stated: FiniteFloat
+    tolerance: FiniteFloat
+    source: str
+    unit: str
+    value: FiniteFloat
+    std: FiniteFloat
+    widens: str
+    share: FiniteFloat
+
+
 class StartRecord(Record):
     """A start that was refined: Q of the minimum that it led to."""
 
@@ -61,6 +76,7 @@ class FitFile(Record):
     chi2: FiniteFloat
     cost: FiniteFloat
     unknowns: dict[str, UnknownRecord]
+    fixed: dict[str, FixedRecord] = Field(default_factory=dict)
     correlation: dict[str, dict[str, FiniteFloat]]
     fit: list[dict[str, FitRecord]]
     starts: list[StartRecord]
@@ -97,6 +113,19 @@ def build_fit_file(
                 interval=found.intervals[name],
             )
             for name, one in found.estimates.items()
+        },
+        fixed={
+            one.number.name: FixedRecord(
+                stated=one.number.value,
+                tolerance=one.number.std,
+                source=one.number.source,
+                unit=one.number.unit,
+                value=one.value,
+                std=one.std,
+                widens=one.widens,
+                share=one.share,
+            )
+            for one in found.moved
         },
         correlation={
             name: dict(zip(names, row.tolist(), strict=True))

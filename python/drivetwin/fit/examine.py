@@ -15,7 +15,7 @@ from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.result import ModelFit
-from drivetwin.fit.search import Problem
+from drivetwin.fit.term import Problem
 
 REPEATS = 4
 """Recordings in place of one that an improvement assumes."""
@@ -24,7 +24,8 @@ REPEATS = 4
 @dataclass(frozen=True)
 class Improvement:
     """Half widths of the 95 % interval of an unknown [SI]: `now`, with `REPEATS` recordings like
-    each, and with the unknown `known` exact, the one that narrows it most; empty if none does."""
+    each, and with the number `known` exact, the unknown or fixed number that narrows it most; empty
+    if none does."""
 
     unknown: str
     now: float
@@ -38,11 +39,13 @@ def rank_improvements(found: ModelFit) -> tuple[Improvement, ...]:
 
     Repeated recordings have starts of their own; a number that is known exactly takes part no more.
     """
-    count = len(found.sought)
-    rest = list(range(count, len(found.minimum.point.names)))
-    data = reduce_information(found.normal.data, list(range(count)), rest)
-    prior = found.problem.prior.precision[:count, :count]
-    now = found.covariance[:count, :count]
+    names = [*(one.name for one in found.sought), *(one.number.name for one in found.moved)]
+    every = range(len(found.minimum.point.names))
+    rest = list(every)[len(found.sought) : len(every) - len(found.moved)]
+    keep = [k for k in every if k not in rest]
+    data = reduce_information(found.normal.data, keep, rest)
+    prior = found.problem.prior.precision[np.ix_(keep, keep)]
+    now = found.covariance[np.ix_(keep, keep)]
     noise = np.diag(now) / np.diag(invert_information(data + prior))
     repeated = noise * np.diag(invert_information(REPEATS * data + prior))
     improvements = []
@@ -51,7 +54,7 @@ def rank_improvements(found: ModelFit) -> tuple[Improvement, ...]:
         left = now[k, k] - now[k, :] ** 2 / np.diag(now)
         left[k] = now[k, k]
         best = int(np.argmin(left))
-        known = "" if best == k else found.sought[best].name
+        known = "" if best == k else names[best]
         widths = Z95 * scale * np.sqrt(np.maximum([now[k, k], repeated[k], left[best]], 0.0))
         improvements.append(
             Improvement(one.name, float(widths[0]), float(widths[1]), known, float(widths[2]))

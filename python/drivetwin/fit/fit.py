@@ -16,12 +16,13 @@ from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import SignalFit
+from drivetwin.fit.fixed_numbers import list_fixed, make_plain
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import NetworkRecord, Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
-from drivetwin.fit.search import Problem, search
+from drivetwin.fit.search import search
 from drivetwin.fit.starts import drop_redundant_speeds, guess_start, list_starts
-from drivetwin.fit.term import NetworkTerm, Plant
+from drivetwin.fit.term import NetworkTerm, Plant, Problem
 from drivetwin.fit.unknown import (
     SoughtNumber,
     require_distinct_places,
@@ -90,7 +91,9 @@ def fit_network(model: NetworkModel, recordings: Sequence[Recording], *, seed: i
         Where no start leads to a minimum.
     """
     problem, point, sought = build_problem(model, recordings)
-    return conclude(model, sought, search(problem, point, sought, seed))
+    unknown = {path for one in sought for path in one.factors}
+    fixed = list_fixed(problem.terms[0].plant.elements, unknown, model.tolerances)
+    return conclude(model, sought, search(problem, point, sought, fixed, seed))
 
 
 def build_problem(
@@ -98,6 +101,7 @@ def build_problem(
 ) -> tuple[Problem, ParameterVector, list[SoughtNumber]]:
     """Build the objective, the first guess of all its unknowns, and those of the network."""
     _require_consistent(model, recordings)
+    model = replace(model, elements=make_plain(model.elements))
     sought = [resolve_unknown(name, one, model.elements) for name, one in model.unknowns.items()]
     require_distinct_places(sought)
     found = _Coordinates([], [], {}, [])

@@ -25,6 +25,7 @@ from drivetwin._util.toml import (
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES, get_quantity
 from drivetwin.errors import InputError, suggest_spelling
+from drivetwin.fit.fixed_numbers import Tolerance, list_fixed
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
 from drivetwin.fit.starts import list_starts
@@ -176,6 +177,7 @@ class NetworkFile(StrictModel):
     outputs: dict[str, OutputEntry] = Field(default_factory=dict)
     start: StartTable = StartTable()
     unknowns: dict[str, Annotated[Unknown, FromTable]] = Field(default_factory=dict)
+    tolerances: dict[str, Annotated[Tolerance, FromTable]] = Field(default_factory=dict)
     run: RunTable | None = None
 
 
@@ -207,7 +209,7 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
     document = read_toml(path, ModelFileError)
     raise_faults(validate_schema(document, NetworkFile), ModelFileError, str(path), _REMEDY)
     file = NetworkFile.model_validate(document)
-    elements = [_to_plain(one) for one in file.elements]
+    elements = file.elements
     refuse_faults(find_element_faults(elements))
     raise_faults(_list_range_faults(elements), ModelFileError, str(path), _REMEDY)
     used = [name for one in elements for name in list_inputs(one)]
@@ -222,9 +224,11 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         Start(start.speeds, start.twists, tuple(start.locked)),
         {name: to_output(one.quantity) for name, one in file.outputs.items()},
         dict(file.unknowns),
+        dict(file.tolerances),
     )
     sought = [resolve_unknown(name, one, elements) for name, one in model.unknowns.items()]
     require_known_places(sought, list_starts(model.start, elements), used)
+    list_fixed(elements, (), model.tolerances)  # raises InputError for a tolerance that is none
     channels = ModelChannels(
         {
             name: file.inputs.get(name, InputEntry()).to_spec(name)
@@ -269,15 +273,6 @@ def _collect_known(start: StartTable, file: str) -> dict[str, float]:
     return {name: stated[name] for name in start.known}
 
 
-def _to_plain(value: Any) -> Any:
-    """Return numbers of a file without their text."""
-    if isinstance(value, dict):
-        return {key: _to_plain(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_to_plain(one) for one in value]
-    return float(value) if isinstance(value, float) else value
-
-
 def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> str:
     """Write a model as the text of a model file.
 
@@ -301,6 +296,9 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
     lines.append(format_entry("known", list(channels.known) if channels else []))
     for name, one in model.unknowns.items():
         lines += ["", f"[unknowns.{format_key(name)}]", *_format_unknown(name, one)]
+    for path, tolerance in model.tolerances.items():
+        lines += ["", f"[tolerances.{format_key(path)}]"]
+        lines += [format_entry(*item) for item in list_stated(tolerance).items()]
     if channels is not None and channels.run is not None:
         lines += _format_run(channels.run)
     return "\n".join(lines) + "\n"

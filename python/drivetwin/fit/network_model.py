@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.unknown import Unknown
 from drivetwin.simulation.network import Element, InputValue, Output, Start
 
@@ -15,7 +16,8 @@ class NetworkModel:
     """Network to be identified.
 
     `inputs` are those that no recording gives; `start` states the nodes whose speeds determine all
-    others, with first guesses; `outputs` are the compared quantities by name.
+    others, with first guesses; `outputs` are the compared quantities by name. `tolerances` are the
+    stated distributions of numbers that are not unknowns, by path.
     """
 
     name: str
@@ -24,3 +26,4 @@ class NetworkModel:
     start: Start
     outputs: Mapping[str, Output]
     unknowns: Mapping[str, Unknown]
+    tolerances: Mapping[str, Tolerance] = field(default_factory=dict)

@@ -21,6 +21,7 @@ from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
 from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.estimation.result.prior_conflict import PRIOR
 from drivetwin.estimation.result.verdict import (
     VERDICT,
     apply_errors,
@@ -28,10 +29,11 @@ from drivetwin.estimation.result.verdict import (
     assess_with_prior,
     compute_correlation,
 )
-from drivetwin.findings import Code, Finding, Severity, report
+from drivetwin.findings import Code, Finding, Number, Severity, report
+from drivetwin.fit.fixed_numbers import FixedNumber, Source, Tolerance
 from drivetwin.fit.network_model import NetworkModel
-from drivetwin.fit.search import FoundMinimum, Problem, RefinedStart
-from drivetwin.fit.term import NetworkTerm
+from drivetwin.fit.search import FoundMinimum, RefinedStart
+from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.vehicle.spec import PriorValue
@@ -114,6 +116,33 @@ WITH_PRIOR = "maximum likelihood with prior"
 """Method of an estimate in which its own prior took part."""
 
 
+@dataclass(frozen=True)
+class MovedNumber:
+    """Number that is not an unknown, at the minimum: `value` and its standard deviation, SI.
+
+    `widens` is the unknown whose variance falls most if the number is exact, by the `share`.
+    """
+
+    number: FixedNumber
+    value: float
+    std: float
+    widens: str
+    share: float
+
+    @property
+    def finding(self) -> Finding | None:
+        """Finding where the recordings determine the number and exclude the stated value."""
+        one = self.number
+        apart = abs(self.value - one.value)
+        if self.std > VERDICT.prior_share * one.std or apart <= PRIOR.agreement * self.std:
+            return None
+        is_within = apart <= Z95 * one.std
+        code = Code.FIXED_NUMBER_REFINED if is_within else Code.FIXED_NUMBER_OFF
+        found = Number(self.value, one.unit or "1", Z95 * self.std)
+        stated = Number(one.value, one.unit or "1", Z95 * one.std)
+        return report(code, one.name, found=found, stated=stated)
+
+
 @dataclass(frozen=True, eq=False)
 class ModelFit:
     """Result of a fit.
@@ -121,7 +150,7 @@ class ModelFit:
     `estimates` by name of the unknown; `intervals` are their 95 % intervals, those of a positive
     number by its logarithm. `starts` are the minima that the refined starts led to, `agreeing` the
     number of those in the best one. `agreement` compares the simulation with each recording, by
-    output.
+    output. `moved` are the numbers beside the unknowns that are coordinates of the minimum.
     """
 
     model: NetworkModel
@@ -135,6 +164,7 @@ class ModelFit:
     agreement: tuple[Mapping[str, SignalFit], ...]
     findings: tuple[Finding, ...]
     status: ModelStatus
+    moved: tuple[MovedNumber, ...] = ()
 
     @property
     def problem(self) -> Problem:
@@ -187,8 +217,14 @@ class ModelFit:
         unknowns = {
             one.name: replace(one.unknown, value=self.values[one.name]) for one in self.sought
         }
+        written = {  # the digits of a moved number are not those that were written
+            one.number.name: Tolerance(one.number.std)
+            for one in self.moved
+            if one.number.source is Source.DIGITS
+        }
         return replace(
             self.model,
+            tolerances={**written, **self.model.tolerances},
             elements=task.elements,
             start=replace(task.start, speeds=speeds),
             unknowns=unknowns,
@@ -214,7 +250,15 @@ def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMi
     failures = tuple(find_failures(problem.terms, minimum.normal.residuals, agreement, chi2))
     doubts = find_doubts(problem.terms, agreement, failures, chi2)
     ended = [report(Code.SEARCH_LIMITED, starts=len(found.starts))] if found.is_limited else []
-    findings = (*failures, *ended, *doubts, *_collect_findings(minimum, sought))
+    moved = tuple(_describe_moved(minimum, covariance, sought, found.fixed))
+    remarks = (one.finding for one in moved)
+    findings = (
+        *failures,
+        *ended,
+        *doubts,
+        *(one for one in remarks if one is not None),
+        *_collect_findings(minimum, sought, len(found.fixed)),
+    )
     estimates = apply_errors(estimates, findings)
     return ModelFit(
         model,
@@ -228,7 +272,26 @@ def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMi
         agreement,
         findings,
         judge_status(failures, findings, estimates),
+        moved,
     )
+
+
+def _describe_moved(
+    minimum: OptimizeResult[Problem],
+    covariance: FloatArray,
+    sought: Sequence[SoughtNumber],
+    fixed: Sequence[FixedNumber],
+) -> Iterator[MovedNumber]:
+    """Yield the fixed numbers at a minimum, of which they are the last coordinates."""
+    first = len(minimum.point.names) - len(fixed)
+    variance = np.diag(covariance)
+    for k, one in enumerate(fixed, start=first):
+        shares = covariance[k, : len(sought)] ** 2 / (variance[k] * variance[: len(sought)])
+        most = int(np.argmax(shares))
+        value = one.move(one.value, float(minimum.point.values[k]))
+        std = one.std * float(np.sqrt(variance[k]))
+        std *= value / one.value if one.is_relative else 1.0
+        yield MovedNumber(one, value, std, sought[most].name, float(shares[most]))
 
 
 def _compute_chi2(minimum: OptimizeResult[Problem]) -> float:
@@ -249,18 +312,22 @@ def _judge(one: SoughtNumber, coordinate: float, std: float) -> Estimate:
 
 
 def _collect_findings(
-    minimum: OptimizeResult[Problem], sought: Sequence[SoughtNumber]
+    minimum: OptimizeResult[Problem], sought: Sequence[SoughtNumber], fixed: int
 ) -> tuple[Finding, ...]:
-    """Test the residuals, and name the directions that the recordings do not identify."""
+    """Test the residuals, and name the directions that the recordings do not identify.
+
+    The `fixed` numbers, the last coordinates, are known by their distributions.
+    """
     state = _State(minimum.problem, minimum.normal)
     labels = [term.label for term in minimum.problem.terms]
     sizes = np.ones(len(minimum.point.names))
     sizes[: len(sought)] = [_get_size(one, minimum.point) for one in sought]
     shown = {k: one.name for k, one in enumerate(sought)}
+    known = np.diag((np.arange(len(sizes)) >= len(sizes) - fixed).astype(float))
     return (
         *check_residuals(state, labels),
         *check_weighting(state, labels),
-        *report_null_directions(minimum.normal.data, sizes, shown, "their priors"),
+        *report_null_directions(minimum.normal.data + known, sizes, shown, "their priors"),
     )
 
 

@@ -18,7 +18,6 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.gauss_newton import (
     GaussNewtonSettings,
     OptimizeResult,
@@ -26,11 +25,11 @@ from drivetwin.estimation.optimize.gauss_newton import (
     predict_decrease,
 )
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.fit.term import NetworkTerm
+from drivetwin.fit.fixed_numbers import FixedNumber
+from drivetwin.fit.release import release_fixed
+from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
-
-Problem = LikelihoodObjective[NetworkTerm]
 
 
 @dataclass(frozen=True)
@@ -85,12 +84,14 @@ class RefinedStart:
 class FoundMinimum:
     """Best minimum, and all that were reached, in the order of their starts.
 
-    `is_limited` is True if the work limit ended the search before a start explained the recordings.
+    `is_limited` is True if the work limit ended the search before a minimum explained the
+    recordings. `fixed` are the numbers beside the unknowns that are coordinates of the best one.
     """
 
     result: OptimizeResult[Problem]
     starts: tuple[RefinedStart, ...]
     is_limited: bool
+    fixed: tuple[FixedNumber, ...] = ()
 
     @property
     def agreeing(self) -> int:
@@ -100,9 +101,13 @@ class FoundMinimum:
 
 
 def search(
-    problem: Problem, start: ParameterVector, sought: Sequence[SoughtNumber], seed: int
+    problem: Problem,
+    start: ParameterVector,
+    sought: Sequence[SoughtNumber],
+    fixed: Sequence[FixedNumber],
+    seed: int,
 ) -> FoundMinimum:
-    """Find the minimum of Q.
+    """Find the minimum of Q: over the unknowns, then over the fixed numbers as well.
 
     Parameters
     ----------
@@ -113,6 +118,8 @@ def search(
     sought
         Unknowns of the network, which come first; those of the starts stay at their guess in the
         screen.
+    fixed
+        Numbers beside the unknowns that are not exact.
     seed
         Seed of the draws.
 
@@ -138,9 +145,10 @@ def search(
         )
     with scale_progress(0.58, 1.0):
         best = _polish(problem, attempts.best.point)
-        is_limited = budget.left < 0.0
+        best, moved = release_fixed(best, fixed, len(sought), BENT)
+        is_limited = budget.left < 0.0 and not _is_explained(best.normal.cost, problem.size)
         best = best if is_limited else _expect_inputs(best)
-        return FoundMinimum(best, tuple(attempts.starts), is_limited)
+        return FoundMinimum(best, tuple(attempts.starts), is_limited, moved)
 
 
 def _coarsen(problem: Problem) -> Problem:
@@ -150,6 +158,11 @@ def _coarsen(problem: Problem) -> Problem:
         for term in problem.terms
     ]
     return replace(problem, terms=tuple(terms))
+
+
+def _is_explained(cost: float, size: int) -> bool:
+    """Return whether Q of `size` samples is about 1 for each."""
+    return cost / size < FIT_SEARCH.accept_chi2 + 3.0 * float(np.sqrt(2.0 / size))
 
 
 class _Attempts:
@@ -169,9 +182,7 @@ class _Attempts:
     @property
     def explains(self) -> bool:
         """True if a minimum explains the recordings: Q per sample is about 1."""
-        size = self.problem.size
-        limit = FIT_SEARCH.accept_chi2 + 3.0 * np.sqrt(2.0 / size)
-        return bool(self.best.cost / size < limit)
+        return _is_explained(self.best.cost, self.problem.size)
 
     def refine(self, start: ParameterVector) -> None:
         """Refine a start; one that fails is left out."""
@@ -234,6 +245,9 @@ class _Screen:
         self.start = start
         self.sought = sought
         self.rng = rng
+        # Runs side by side have their delays and tables in common.
+        delays = (one.name for one in sought if any(p.startswith("delay.") for p in one.factors))
+        self.still = {*problem.terms[0].plant.list_undifferentiated(), *delays}
         self.draws = np.empty((0, len(sought)))
         self.scores = np.empty(0)
 
@@ -244,12 +258,12 @@ class _Screen:
             draws = np.array([self._draw_prior(one) for one in self.sought]).T
         else:
             draws = self._draw_about_best(number)
-        for k, one in enumerate(self.sought):
-            if any(path.startswith("delay.") for path in one.factors):
-                draws[:, k] = one.start  # one delay for all runs side by side
+        moving = np.array([one.name not in self.still for one in self.sought])
+        draws = np.where(moving, draws, [one.start for one in self.sought])
+        drawn = [one for one in self.sought if one.name not in self.still]
         scores = np.zeros(len(draws))
         for term in self.problem.terms:
-            scores += _compute_scores(term, self.start, self.sought, draws)
+            scores += _compute_scores(term, self.start, drawn, draws[:, moving])
         self.draws = np.concatenate([self.draws, draws])
         self.scores = np.concatenate([self.scores, scores])
         order = np.argsort(scores, kind="stable")[: FIT_SEARCH.round_starts]
@@ -304,7 +318,6 @@ def _compute_scores(
         path: factor * (np.exp(column) if one.is_positive else column)
         for one, column in zip(sought, draws.T, strict=True)
         for path, factor in one.factors.items()
-        if not path.startswith("delay.")
     }
     scenario = NetworkScenario(task.inputs, task.start)
     found = simulate_network_batch(

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -21,10 +21,11 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
     add_input_noise,
     build_sensor_whitener,
 )
-from drivetwin.estimation.likelihood.objective import OBJECTIVE
+from drivetwin.estimation.likelihood.objective import OBJECTIVE, LikelihoodObjective
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.estimation.result.validation import compute_fit
+from drivetwin.fit.fixed_numbers import CopiedElements, FixedNumber, Place, iterate_numbers
 from drivetwin.fit.recording import NetworkRecord
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.simulation.dual_clutch import Accuracy, Signal
@@ -39,8 +40,9 @@ class Plant:
     """Network of one recording.
 
     `inputs` are those that no channel gives. `sought` are the unknowns of the network, `own` those
-    of the start of this recording by node or shaft. `label` precedes the latter in the vector of
-    the unknowns: `log1.start.engine`; empty where there is one recording.
+    of the start of this recording by node or shaft, `fixed` the numbers beside the unknowns that
+    may move. `label` precedes the start in the vector of the unknowns: `log1.start.engine`; empty
+    where there is one recording.
     """
 
     elements: Sequence[Element]
@@ -50,11 +52,34 @@ class Plant:
     sought: Sequence[SoughtNumber]
     own: Sequence[str] = ()
     label: str = ""
+    fixed: Sequence[FixedNumber] = ()
     accuracy: Accuracy = field(default_factory=Accuracy)
+
+    @cached_property
+    def _places(self) -> dict[str, Place]:
+        return {
+            ".".join(map(str, (one["name"], *keys))): (index, *keys)
+            for index, one in enumerate(self.elements)
+            for keys, *_ in iterate_numbers(one)
+        }
 
     def get_start_name(self, name: str) -> str:
         """Return the unknown of the start of a node or shaft."""
         return f"{self.label}.start.{name}" if self.label else f"start.{name}"
+
+    def list_undifferentiated(self) -> list[str]:
+        """List the coordinates that act on numbers by which the core has no derivatives."""
+        tables = {path for path, place in self._places.items() if _is_table(place)}
+        sought = [one.name for one in self.sought if tables & one.factors.keys()]
+        fixed = [one.coordinate for one in self.fixed if any(map(_is_table, one.places))]
+        return [*sought, *fixed]
+
+    def get_step(self, name: str) -> float:
+        """Return the step of a coordinate for a difference of runs."""
+        for one in self.sought:
+            if one.name == name:
+                return _SHARE * (1.0 if one.is_positive else max(abs(one.start), 1e-6))
+        return _STEP
 
     def build_task(
         self, point: ParameterVector, inputs: Mapping[str, Signal], time: FloatArray
@@ -63,8 +88,7 @@ class Plant:
 
         Numbers carry their derivatives where those of the point do.
         """
-        elements: list[Any] = list(self.elements)
-        copied: dict[str, int] = {}
+        elements = CopiedElements(self.elements)
         every: dict[str, Signal | Sine] = {**self.inputs, **inputs}
         speeds, twists = dict(self.start.speeds), dict(self.start.twists)
         for name in self.own:
@@ -82,23 +106,25 @@ class Plant:
                 elif head == "start":
                     (speeds if rest in speeds else twists)[rest] = number
                 else:
-                    _place(elements, copied, path, number)
+                    elements.put(self._places[path], number)
+        for fixed in self.fixed:
+            x = point[fixed.coordinate]
+            for place in fixed.places:
+                elements.put(place, fixed.move(elements.get(place), x))
         start = Start(speeds, twists, self.start.locked)
         outputs = list(self.outputs.values())
-        return NetworkTask(elements, every, start, time, outputs, self.accuracy)
+        return NetworkTask(elements.listed, every, start, time, outputs, self.accuracy)
 
 
-def _place(elements: list[Any], copied: dict[str, int], path: str, number: float) -> None:
-    """Put a number at a path of the elements; an element is copied before it changes."""
-    head, *names = path.split(".")
-    if head not in copied:
-        copied[head] = next(k for k, one in enumerate(elements) if one["name"] == head)
-        elements[copied[head]] = copy.deepcopy(elements[copied[head]])
-    place = elements[copied[head]]
-    for name in names[:-1]:
-        place = place[int(name)] if isinstance(place, list) else place[name]
-    last = names[-1]
-    place[int(last) if isinstance(place, list) else last] = number
+_TABLES = ("map", "losses", "drag", "least_speed")
+"""Fields and groups of elements that the core does not differentiate by."""
+_SHARE, _STEP = 1e-3, 0.1
+"""Steps of a difference of runs: of an unknown [ratio], of a fixed number [standard deviations]."""
+
+
+def _is_table(place: Place) -> bool:
+    """Return whether the core has no derivatives by the number at a place."""
+    return place[1] in _TABLES or place[1:3] == ("friction", "slip")
 
 
 _PROBES = 8
@@ -164,7 +190,9 @@ class NetworkTerm:
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
         `point`; None if the simulation fails."""
-        task = self.plant.build_task(point.to_variables(), self.record.inputs, self.record.time)
+        apart = self.plant.list_undifferentiated()
+        variables = point.to_variables(apart)
+        task = self.plant.build_task(variables, self.record.inputs, self.record.time)
         try:
             found = task.differentiate(len(point.names))
         except InputError:
@@ -174,7 +202,26 @@ class NetworkTerm:
             return None
         by_name = {name: found.derivatives[output] for name, output in self.plant.outputs.items()}
         slopes = self.record.sample(by_name)
+        for name in apart:
+            column = self._compute_slope(point, name, residual)
+            if column is None:
+                return None
+            slopes[:, point.names.index(name)] = column
         return (residual, slopes) if np.all(np.isfinite(slopes)) else None
+
+    def _compute_slope(
+        self, point: ParameterVector, name: str, residual: FloatArray
+    ) -> FloatArray | None:
+        """Compute the derivative (n,) of the samples by a coordinate as the difference of two runs;
+        None if no step away from `point`, which leaves the `residual` (n,), can be simulated."""
+        place, step = point.names.index(name), self.plant.get_step(name)
+        for side in (step, -step):
+            values = point.values.copy()
+            values[place] += side
+            there = self.evaluate(point.replace_values(values))
+            if there is not None:
+                return np.asarray((residual - there) / side)
+        return None
 
     def _compute_residual(self, run: NetworkRun) -> FloatArray | None:
         """Compute measured minus simulated (n,), the latter as for the measured inputs; None for
@@ -267,6 +314,9 @@ class NetworkTerm:
         task = self.plant.build_task(point, self.record.inputs, self.record.time[:2])
         inputs = {name: task.inputs[name] for name in self.record.inputs}
         return {name: float(one.delay) for name, one in inputs.items() if isinstance(one, Signal)}
+
+
+Problem = LikelihoodObjective[NetworkTerm]
 
 
 def _add_direct_noise(

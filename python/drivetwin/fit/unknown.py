@@ -162,13 +162,13 @@ def _bound(stated: float | None, fields: Sequence[tuple[ElementField, float]], s
     return min(limits, default=math.inf)
 
 
-_ASCII = str.maketrans({"·": "*", "²": "^2", "³": "^3"})
+ASCII_UNITS = str.maketrans({"·": "*", "²": "^2", "³": "^3"})
 """Spelling of the units of the parameter table."""
 
 
 def _get_unit(path: str, first: ElementField | None) -> str:
     if first is not None:
-        return first.unit.translate(_ASCII) or "1"
+        return first.unit.translate(ASCII_UNITS) or "1"
     return "s" if path.startswith("delay.") else "1"
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from drivetwin.errors import suggest_spelling
 from drivetwin.export.modelica.model import Run, format_package
 from drivetwin.fit.fit import fit_network
+from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Recording
 from drivetwin.fit.result import ModelFit
@@ -224,6 +225,7 @@ class Model(ElementMethods):
         unknowns: Mapping[str, Unknown],
         outputs: Mapping[str, Output],
         *,
+        tolerances: Mapping[str, Tolerance] | None = None,
         seed: int = 0,
     ) -> ModelFit:
         """Identify numbers of the model from recordings.
@@ -238,6 +240,9 @@ class Model(ElementMethods):
             with the paths that share it.
         outputs
             Quantity that each measured output is, by its name in the recordings.
+        tolerances
+            Distributions of numbers that are not unknowns, by path, such as `gear.ratio`, or by
+            element where they are exact; usual ones where nothing is stated.
         seed
             Seed of the draws from which the search starts.
 
@@ -254,19 +259,24 @@ class Model(ElementMethods):
             Where no start leads to a minimum.
         """
         several = [recordings] if isinstance(recordings, Recording) else list(recordings)
-        return fit_network(self.describe(unknowns, outputs), several, seed=seed)
+        model = self.describe(unknowns, outputs, tolerances)
+        return fit_network(model, several, seed=seed)
 
     def describe(
-        self, unknowns: Mapping[str, Unknown], outputs: Mapping[str, Output]
+        self,
+        unknowns: Mapping[str, Unknown],
+        outputs: Mapping[str, Output],
+        tolerances: Mapping[str, Tolerance] | None = None,
     ) -> NetworkModel:
-        """Return the network with its unknowns and compared quantities as a model file has it.
+        """Return the network as a model file has it: with unknowns, compared quantities and
+        tolerances.
 
         Raises InputError with all faults of the model.
         """
         elements = [component.element for component in self.components]
-        return NetworkModel(
-            self.name, elements, self.inputs, self._resolve_start(), outputs, unknowns
-        )
+        start = self._resolve_start()
+        given = (self.name, elements, self.inputs, start, outputs, unknowns)
+        return NetworkModel(*given, tolerances or {})
 
     def list_outputs(self) -> list[Output]:
         """List everything that a run records."""

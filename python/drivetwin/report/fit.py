@@ -11,13 +11,15 @@ from drivetwin._util.display_units import (
     format_significant,
     format_uncertainty,
     get_display_unit,
+    scale_display,
 )
 from drivetwin.channels.roles import Quantity
+from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.fit import HeldOut
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
-from drivetwin.fit.result import ModelFit
+from drivetwin.fit.result import ModelFit, MovedNumber
 from drivetwin.fit.term import NetworkTerm
 from drivetwin.report.blocks import (
     Block,
@@ -38,6 +40,8 @@ from drivetwin.simulation.network import NetworkRun
 
 _HEIGHT = 190
 """Height of a panel [px]."""
+_WIDENS = 0.01
+"""Share in the variance of an unknown from which a fixed number is listed [ratio]."""
 _ACTIONS = {
     ModelStatus.VALID: "Use the values and the fitted model.",
     ModelStatus.LIMITED: "Use the identified values; see the findings for the others.",
@@ -100,7 +104,36 @@ def _build_verdict(found: ModelFit) -> VerdictBlock:
 
 def _build_parameters(found: ModelFit) -> list[Block]:
     count = len(found.estimates)
-    return build_parameter_blocks(found.estimates, f"{count} unknowns of the model.")
+    blocks = build_parameter_blocks(found.estimates, f"{count} unknowns of the model.")
+    return [*blocks, *_build_fixed_table(found)]
+
+
+def _build_fixed_table(found: ModelFit) -> list[TableBlock]:
+    """Build the table of the numbers beside the unknowns that widen an interval."""
+    shown = [one for one in found.moved if one.share >= _WIDENS or one.finding is not None]
+    if not shown:
+        return []
+    columns = (
+        "fixed number",
+        ("stated ± 95 %", "s"),
+        ("with the recordings", "s"),
+        "unit",
+        "tolerance",
+        Cell("widens most (share of the variance)", secondary=True),
+    )
+    title = "Numbers of the model that are no unknowns, and widen intervals"
+    return [make_table(title, columns, map(_build_fixed_row, shown))]
+
+
+def _build_fixed_row(one: MovedNumber) -> tuple[str, ...]:
+    number = one.number
+    display = scale_display(get_display_unit(number.unit or "1"), number.value)
+    texts = [
+        " ± ".join(format_uncertainty(value * display.factor, Z95 * std * display.factor))
+        for value, std in ((number.value, number.std), (one.value, one.std))
+    ]
+    widened = f"{one.widens} ({100.0 * one.share:.0f} %)"
+    return number.name, *texts, display.label, str(number.source), widened
 
 
 def _build_figure(log: str, term: NetworkTerm, run: NetworkRun) -> FigureBlock:

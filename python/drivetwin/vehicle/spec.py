@@ -162,6 +162,49 @@ its partner [ratio]; engineering estimate for two clutches with the same lining 
 PARTNER_REST_STD = 0.015
 """Standard deviation of the rise of friction to zero slip of such an element beyond that of its
 partner [-]; engineering estimate."""
+CONVERTER_POINT_STD = 0.03
+"""Standard deviation of a point of a converter map [ratio]; engineering estimate: test benches,
+reading of a diagram."""
+CONVERTER_SCALE_STD = 0.03
+"""Standard deviation of the scale that all capacities of a converter share [ratio]; engineering
+estimate: oil temperature, production scatter."""
+FRICTION_LEVEL_STD = 0.1
+"""Standard deviation of the friction level of an element without an identified partner [ratio];
+engineering estimate: a usual μ of a paper lining is 0.09 to 0.15."""
+STRIBECK_SPEED_STD = 0.3
+"""Standard deviation of the Stribeck speed of a friction law [ratio]; engineering estimate: linings
+and oils of one kind differ by a factor of 2."""
+VISCOUS_SLOPE_STD = 0.5
+"""Standard deviation of the viscous slope of a friction law [ratio]; engineering estimate."""
+PEAK_STD = 0.05
+"""Standard deviation of static over kinetic capacity [-]; engineering estimate."""
+STIFFNESS_STD = 0.1
+"""Standard deviation of a stiffness [ratio]; engineering estimate: drawing of a shaft, without the
+compliance of its flanges."""
+DAMPING_STD = 0.3
+"""Standard deviation of a damping [ratio]; engineering estimate: no drawing states it."""
+PLAY_STD = 0.3
+"""Standard deviation of a play [ratio]; engineering estimate: tolerances and wear of splines."""
+EFFICIENCY_STD = 0.01
+"""Standard deviation of the efficiency of a gear [-]; engineering estimate."""
+DRAG_STD = 0.3
+"""Standard deviation of the level of a drag, a loss or a bearing friction [ratio]; engineering
+estimate: it changes with the oil temperature."""
+TORQUE_MAP_STD = 0.03
+"""Standard deviation of the level of an engine map [ratio]; engineering estimate."""
+LAG_STD = 0.3
+"""Standard deviation of a time constant [ratio]; engineering estimate."""
+TYRE_STD = 0.2
+"""Standard deviation of the slip stiffness of a tyre [ratio]; engineering estimate: load, pressure,
+wear."""
+LOAD_STD = 0.1
+"""Standard deviation of a constant load [ratio]; engineering estimate."""
+ROLLING_STD = 0.2
+"""Standard deviation of a rolling resistance [ratio]; engineering estimate: tyre, road,
+temperature."""
+AERO_STD = 0.2
+"""Standard deviation of an aerodynamic coefficient [ratio]; engineering estimate: density of the
+air, wind, additions to the body."""
 
 TEETH = re.compile(r"\s*\d{1,6}\s*/\s*\d{1,6}\s*(\*\s*\d{1,6}\s*/\s*\d{1,6}\s*)*")
 """A ratio as tooth counts, `49/33` or `49/33 * 41/20`."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -24,20 +24,26 @@ class ParameterVector:
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
 
-    def to_variables(self) -> ParameterVector:
-        """Return a vector of the same parameters that carry their derivatives by one another."""
-        return _VariableVector(self.names, self.values)
+    def to_variables(self, plain: Collection[str] = ()) -> ParameterVector:
+        """Return a vector of the same parameters that carry their derivatives by one another, but
+        for those that are to stay `plain`."""
+        return _VariableVector(self.names, self.values, plain)
 
     def replace_values(self, values: FloatArray) -> ParameterVector:
         """Return a vector of the same parameters with other `values` (p,)."""
         return ParameterVector(self.names, values)
 
 
+@dataclass(frozen=True, eq=False)
 class _VariableVector(ParameterVector):
-    """Parameter vector whose elements are variables."""
+    """Parameter vector whose elements are variables, but for the `plain` ones."""
+
+    plain: Collection[str]
 
     def __getitem__(self, name: str) -> float:
         place = self.names.index(name)
+        if name in self.plain:
+            return float(self.values[place])
         slopes = np.zeros(len(self.names))
         slopes[place] = 1.0
         return Variable(float(self.values[place]), slopes)
