@@ -102,6 +102,7 @@ def _extend(
         prior=Prior(np.append(problem.prior.mean, np.zeros(count)), precision),
         lower=np.append(problem.lower, -reach),
         upper=np.append(problem.upper, reach),
+        reach=np.append(np.broadcast_to(problem.reach, size), reach),
     )
     names = (*point.names, *(one.coordinate for one in fixed))
     return wider, ParameterVector(names, np.append(point.values, np.zeros(count)))
