@@ -22,8 +22,7 @@ from drivetwin.drive import (
     plan_launch,
     run,
 )
-from drivetwin.drive.dogs import ENGAGED, split_gear
-from drivetwin.drive.plan import list_forward_gears
+from drivetwin.drive.dogs import split_gear
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, build_network_elements, load_gearbox, solve_gear
 from drivetwin.simulation.dual_clutch import Signal
@@ -46,7 +45,8 @@ def driven(box: Gearbox) -> DriveRun:
 
 def test_every_gear_is_reached_at_its_ratio(box: Gearbox, driven: DriveRun) -> None:
     shifts = [each.action for each in driven.maneuvers if each.action.kind in list(ShiftKind)]
-    assert {action.label.partition("→")[2] for action in shifts} >= {*list_forward_gears(box)[1:]}
+    forward = {gear.name for gear in box.gears if solve_gear(box, gear.name).ratio > 0.0}
+    assert {action.label.partition("→")[2] for action in shifts} >= forward - {"1"}
     for action in shifts:
         gear = action.label.partition("→")[2]
         at = np.searchsorted(driven.time, action.end)
@@ -74,7 +74,7 @@ def test_dogs_engage_without_slip_and_hold(box: Gearbox, driven: DriveRun) -> No
                 inside = (driven.time > event.time) & (driven.time < after.time)
                 assert np.abs(driven.slip[dog][inside]).max() < 1e-9  # round-off
                 at = np.searchsorted(driven.time, event.time)
-                assert abs(driven.torque[dog][at - 1]) < 1e-3 * ENGAGED
+                assert abs(driven.torque[dog][at - 1]) < 1e3  # N m
 
 
 def test_a_manual_gearbox_interrupts_the_torque_and_a_dual_clutch_does_not(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +23,6 @@ from drivetwin.drive import (
     run,
     select_powertrain,
 )
-from drivetwin.drive.network import LOCK_UP
-from drivetwin.drive.result import Maneuver
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, load_gearbox, solve_gear
 from drivetwin.logs.read import read_log
@@ -112,7 +111,7 @@ def test_engine_torque_and_converter_account_for_the_crankshaft(
     inertia = gearbox.require_drive().engine_inertia
     assert drive.converter is not None
     pump = drive.converter.turbine_torque / drive.converter.torque_ratio
-    net = drive.engine_torque - pump - drive.torque[LOCK_UP]
+    net = drive.engine_torque - pump - drive.torque["lock-up"]
     for begin, end in ((0.0, 6.0), (20.0, 22.0)):
         span = slice(*np.searchsorted(drive.time, (begin, end)))
         gained = np.trapezoid(net[span], drive.time[span]) / inertia
@@ -210,7 +209,7 @@ def test_every_shift_is_found_in_what_the_bus_tells(
         assert shift.inertia_phase == pytest.approx((begun, each.lock), abs=0.05)
 
 
-def _slip_begun(drive: DriveRun, shift: Maneuver, ratio: float) -> float:
+def _slip_begun(drive: DriveRun, shift: Any, ratio: float) -> float:
     """When the slip of the gear left passes 5 % of that at lock-up, as slow speeds show it."""
     assert shift.lock is not None
     during = (drive.time >= shift.action.start) & (drive.time <= shift.lock)

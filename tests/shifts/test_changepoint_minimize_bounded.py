@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from drivetwin.shifts.changepoint import minimize_bounded
 
 
-@settings(max_examples=60, derandomize=True)
+@settings(derandomize=True)
 @given(
     centre=st.floats(-2.0, 2.0),
     power=st.sampled_from([1.0, 1.5, 2.0, 4.0]),
@@ -31,16 +30,7 @@ def test_takes_the_steps_of_scipy(centre: float, power: float, ripple: float, wi
     assert found == pytest.approx(float(expected), abs=1e-12)
 
 
-@given(st.floats(-1.0, 1.0))
-def test_finds_the_minimum_of_a_parabola(centre: float) -> None:
-    found = minimize_bounded(lambda x: (x - centre) ** 2, (-2.0, 3.0), 1e-6)
-    assert found == pytest.approx(centre, abs=1e-5)
-
-
 def test_ends_at_a_bound_of_a_monotone_function() -> None:
     assert minimize_bounded(lambda x: x, (1.0, 2.0), 1e-6) == pytest.approx(1.0, abs=1e-5)
     assert minimize_bounded(lambda x: -x, (1.0, 2.0), 1e-6) == pytest.approx(2.0, abs=1e-5)
-
-
-def test_ends_on_a_constant() -> None:
-    assert np.isfinite(minimize_bounded(lambda _: 1.0, (0.0, 1.0), 1e-6))
+    assert math.isfinite(minimize_bounded(lambda _: 1.0, (0.0, 1.0), 1e-6))
