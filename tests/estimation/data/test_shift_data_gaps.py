@@ -15,6 +15,7 @@ from drivetwin.findings import render
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from tests.estimation.asked import record_log, stepped
+from tests.support.repeats import mark_repeats
 
 STEP = (1.0, 1.3)
 """A throttle step of the log lies in here: a straight line over it is far from the truth."""
@@ -54,14 +55,16 @@ def _list_moved(found: Identification) -> list[str]:
     return wrong
 
 
-@pytest.mark.parametrize(
-    "gaps",
-    [
-        {"engine_torque": STEP, "output_speed": (2.66, 2.68)},
-        {"output_torque": STEP, "input_speed": STEP, "wheel_speed": LATE},
-        {"wheel_speed": STEP, "output_torque": SHIFTING, "engine_torque": EARLY},
-    ],
-)
+DAILY: Gaps = {"engine_torque": STEP, "wheel_speed": LATE, "output_torque": SHIFTING}
+CASES: list[Gaps] = [
+    DAILY,
+    {"engine_torque": STEP, "output_speed": (2.66, 2.68)},
+    {"output_torque": STEP, "input_speed": STEP, "wheel_speed": LATE},
+    {"wheel_speed": STEP, "output_torque": SHIFTING, "engine_torque": EARLY},
+]
+
+
+@pytest.mark.parametrize("gaps", mark_repeats(CASES, [DAILY]))
 def test_gaps_cost_precision_only(gaps: Gaps) -> None:
     """Over a throttle step, in the shift, and at both ends of the log."""
     found = _identify(_cut(gaps))
@@ -72,6 +75,7 @@ def test_gaps_cost_precision_only(gaps: Gaps) -> None:
         assert any("no samples from" in text for text in render(shift.findings))
 
 
+@pytest.mark.exhaustive
 def test_the_samples_beside_a_gap_are_not_joined() -> None:
     """Bridged, the same gap would move η by several standard deviations."""
     log, _ = record_log("paper_steps")

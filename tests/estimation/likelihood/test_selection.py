@@ -141,6 +141,7 @@ CASES = {
 AT_NIGHT = (
     "slow outputs are means",
     "means without an output torque",
+    "pressure near P0",
     "tyres slip by 0.6 %",
     "progressive shaft",
 )
