@@ -10,9 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.cli import main
 from tests.calibration.cases import QUICK
 
 
@@ -29,7 +27,9 @@ class Files:
 def bench_files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     """Log, card and truth of the `paper_steps` scenario with its noise."""
     folder = tmp_path_factory.mktemp("bench")
-    return Files(*write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1)))
+    log = folder / "bench.csv"
+    assert main(["synth", "-o", str(log), "--scenario", "paper_steps", "--seed", "1"]) == 0
+    return Files(log, log.with_suffix(".card.toml"), log.with_suffix(".truth.json"))
 
 
 @pytest.fixture(scope="module")

@@ -3,35 +3,34 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.read_options import (
-    ChannelSpec,
-    ReadOptions,
-    RememberedChannel,
-    RememberedMapping,
-    TimeColumn,
-)
 from drivetwin.cli.arguments import read_twin_log
 from drivetwin.errors import MissingChannelError
+from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.twin.twin import Twin
-from tests.cli.conftest import Files
 from tests.export.parameters.sample import twin as sample_twin
 
 TEXT = '[channels.input_speed]\nsource = "{}"\n'
 
 
-def make_twin(options: ReadOptions | None = None) -> Twin:
+def make_twin(folder: Path, more: str = "") -> Twin:
     """A twin that remembers three channels of its log."""
-    channels = {
-        "input_speed": RememberedChannel(ChannelSpec("a"), "rpm"),
-        "output_speed": RememberedChannel(ChannelSpec("b"), "rpm"),
-        "throttle": RememberedChannel(ChannelSpec("pedal"), "%"),
+    path = folder / "twin.toml"
+    save_twin(path, sample_twin())
+    columns = {
+        "input_speed": ("a", "rpm"),
+        "output_speed": ("b", "rpm"),
+        "throttle": ("pedal", "%"),
     }
-    return replace(sample_twin(), mapping=RememberedMapping(channels, options or ReadOptions()))
+    tables = [
+        f'[transmission.channels.{role}]\nsource = "{source}"\nfile_unit = "{unit}"\n'
+        for role, (source, unit) in columns.items()
+    ]
+    path.write_text("".join([path.read_text("utf-8"), *tables, more]), "utf-8")
+    return load_twin(path)
 
 
 def write_log(path: Path, head: str, factor: float = 1.0) -> Path:
@@ -44,7 +43,7 @@ def write_log(path: Path, head: str, factor: float = 1.0) -> Path:
 
 
 def read_source(log: Path, channels: Path | None = None) -> str:
-    recording, _ = read_twin_log(make_twin(), log, None, channels)
+    recording, _ = read_twin_log(make_twin(log.parent), log, None, channels)
     return recording["input_speed"].source_name
 
 
@@ -74,7 +73,7 @@ def test_an_absent_required_channel_is_a_typed_error_with_role_and_channel(tmp_p
 
 def test_units_of_the_twin_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = write_log(tmp_path / "log.csv", "time [s],a,b,c")
-    recording, _ = read_twin_log(make_twin(), log, None, None)
+    recording, _ = read_twin_log(make_twin(log.parent), log, None, None)
     assert recording["input_speed"].source_unit == "rpm"
     assert "a in 'rpm', b in 'rpm'" in capsys.readouterr().err
 
@@ -83,7 +82,7 @@ def test_time_column_and_unit_are_those_of_the_twin(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = write_log(tmp_path / "log.csv", "clk,a [rpm],b [rpm],c [rpm]", factor=1e3)
-    twin = make_twin(ReadOptions(TimeColumn("clk", "ms")))
+    twin = make_twin(tmp_path, '[log]\ntime_source = "clk"\ntime_unit = "ms"\n')
     recording, _ = read_twin_log(twin, log, None, None)
     assert recording["input_speed"].time[-1] == pytest.approx(1.99, abs=0.1)
     assert "Time column" in capsys.readouterr().err
@@ -91,12 +90,3 @@ def test_time_column_and_unit_are_those_of_the_twin(
     recording, _ = read_twin_log(twin, other, None, None)
     assert recording["input_speed"].time[-1] == pytest.approx(1.99, abs=0.1)
     assert "Time column" not in capsys.readouterr().err
-
-
-def test_another_card_is_used_with_the_mapping_of_the_twin(
-    bench_files: Files, tmp_path: Path
-) -> None:
-    log = write_log(tmp_path / "log.csv", "time [s],a,b,c")
-    recording, card = read_twin_log(make_twin(), log, bench_files.card, None)
-    assert recording["input_speed"].source_name == "a"
-    assert card.source == str(bench_files.card)

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin._util.atomic import protect_files
 from drivetwin.cli.atomic_outputs import write_atomically
-from drivetwin.errors import FileFormatError, InputError, Where
+from drivetwin.errors import FileFormatError, Where
 
 
 def test_files_appear_together_in_a_new_folder(tmp_path: Path) -> None:
@@ -61,21 +60,6 @@ def test_an_existing_folder_keeps_its_other_files(tmp_path: Path) -> None:
     with write_atomically(tmp_path) as beside:
         (beside / "result.json").write_text("{}")
     assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "result.json"}
-
-
-def test_a_file_to_be_kept_keeps_the_whole_folder_as_it_was(tmp_path: Path) -> None:
-    log = tmp_path / "z.csv"
-    log.write_text("log")
-
-    def write() -> None:
-        with write_atomically(tmp_path) as beside:
-            (beside / "a.toml").write_text("card")
-            (beside / "z.csv").write_text("synthetic")
-
-    with protect_files([log]), pytest.raises(InputError) as caught:
-        write()
-    assert caught.value.where.file == str(log)
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("z.csv", "log")]
 
 
 def test_a_folder_that_is_a_file_is_named_as_given(tmp_path: Path) -> None:

@@ -12,30 +12,11 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.output import Remaining
 from tests.cli.conftest import Files
 
 
 def identify(files: Files, output: Path) -> list[str]:
     return ["identify", str(files.log), "--vehicle", str(files.card), "-o", str(output)]
-
-
-@pytest.mark.parametrize("moment", [0.0, 0.5])
-def test_during_an_identification(
-    bench_files: Files,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    moment: float,
-) -> None:
-    def stop(_: Remaining, share: float, __: str) -> None:
-        if share >= moment:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Remaining, "update", stop)
-    assert main(identify(bench_files, tmp_path / "out")) == 130
-    assert list(tmp_path.iterdir()) == []
-    assert "interrupted" in capsys.readouterr().err
 
 
 def test_while_the_last_file_is_written_keeps_the_old_ones(

@@ -8,19 +8,19 @@ import math
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from drivetwin.calibration.calibrate import polish_from
+from drivetwin.calibration import front
 from drivetwin.calibration.metrics import list_outputs
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli import main
-from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_file import save_twin
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
+from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import simulate
 from tests.calibration.twins import (
     ADDED_ELEMENTS,
@@ -156,7 +156,7 @@ def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> 
     after = shift.time - shift.request
     inputs = {
         name: Signal(shift.time, np.interp(after, one.axis.points, one.values))
-        for name, one in zip((ENGINE_TORQUE, "B2", "B3"), curves, strict=True)
+        for name, one in zip(("engine_torque", "B2", "B3"), curves, strict=True)
     }
     start, outputs = shift.start, list_outputs(shift)
     run = simulate(assemble(shift, ADDED_ELEMENTS[part]), inputs, start, shift.time, outputs)
@@ -253,30 +253,6 @@ def test_refusals(
     assert said in capsys.readouterr().err
 
 
-def test_a_twin_that_is_not_valid_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "weak.toml"
-    save_twin(path, replace(make_twin(Verdict.WEAK)))
-    assert main(["calibrate", str(path), "--shift", "2-3", "-o", str(tmp_path / "out")]) == 2
-    assert "not valid" in capsys.readouterr().err
-
-
-def test_an_interrupt_leaves_nothing(
-    twin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("drivetwin.calibration.calibrate.search_minima", interrupt)
-    out = tmp_path / "out"
-    code = main(["calibrate", str(twin), "--shift", "2-3", "-o", str(out), *SHORT])
-    assert code == 130
-    assert not out.exists()
-    assert list(tmp_path.iterdir()) == []
-    assert not out.with_name("out.resume.json").exists()
-
-
 def test_an_interrupted_calibration_continues_to_the_same_result(
     twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -287,14 +263,15 @@ def test_an_interrupted_calibration_continues_to_the_same_result(
     assert main([*given, *SHORT, "-o", str(whole)]) == 0
     kept = out.with_name("out.resume.json")
     calls = iter(range(100))
+    polish = front.polish_from
 
-    def stop_later(*arguments: object) -> object:
+    def stop_later(*arguments: Any) -> object:
         if next(calls) == 3:
             raise KeyboardInterrupt
-        return polish_from(*arguments)  # type: ignore[arg-type]
+        return polish(*arguments)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("drivetwin.calibration.front.polish_from", stop_later)
+        patch.setattr(front, "polish_from", stop_later)
         assert main([*given, *SHORT, "-o", str(out)]) == 130
     assert not out.exists()
     assert len(json.loads(kept.read_text(encoding="utf-8"))["stages"]) == 4
@@ -304,9 +281,7 @@ def test_an_interrupted_calibration_continues_to_the_same_result(
     limits.write_text("[limits]\nshift_time_s = 1.2\n")
     assert main([*given, *SHORT, "-o", str(out), "--resume", "--seed", "2"]) == 2
     assert "another seed" in capsys.readouterr().err
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("drivetwin.calibration.calibrate.find_best", None)  # the search is finished
-        assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 0
+    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 0
     assert not kept.exists()
     for name in ("calibration.toml", "certificate.json", "calibration.dcm"):
         assert (out / name).read_bytes() == (whole / name).read_bytes()

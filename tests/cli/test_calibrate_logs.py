@@ -12,9 +12,8 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.files.calibration_file import read_calibration_file
 from drivetwin.files.twin_file import load_twin, save_twin
-from drivetwin.twin.twin import build_nominal_shift
 from tests.calibration.bench import write_bench_log
-from tests.calibration.twins import make_twin
+from tests.calibration.twins import build_model, make_twin
 
 pytestmark = pytest.mark.usefixtures("quick_search")
 
@@ -25,7 +24,7 @@ def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(
     source, log, limits = (tmp_path / name for name in ("t.toml", "bench.csv", "limits.toml"))
     twin = make_twin()
     save_twin(source, twin)
-    model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
+    model = build_model(twin)
     old, new = model.elements
     write_bench_log(log, replace(model, elements=(old, replace(new, gain=1.04 * new.gain))))
     limits.write_text("[limits]\nshift_time_s = 1.4\n")

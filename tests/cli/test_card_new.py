@@ -6,12 +6,12 @@ from __future__ import annotations
 import json
 import os
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from drivetwin._util.toml import parse_toml
 from drivetwin.cli import main
 from drivetwin.vehicle.card import load_card
 from tests.cli.conftest import Files
@@ -77,7 +77,7 @@ def test_a_log_without_terminal_gives_a_draft(
     said = " ".join(capsys.readouterr().out.split())
     assert "gain of B3" in said
     text = card.read_text(encoding="utf-8")
-    document = parse_toml(text)
+    document = tomllib.loads(text)
     ratios = [*(gear["ratio"] for gear in document["gears"]), document["final_drive"]]
     for found, true in zip(ratios, (1.91, 1.43, 5.38), strict=True):
         assert 0.0 < found["std"] < 1e-3
@@ -98,12 +98,6 @@ def test_the_result_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     draft = ["card", "new", "--draft", "--json", "-o", str(tmp_path / "b.toml")]
     assert main(draft) == 0
     assert "--final-drive RATIO" in json.loads(capsys.readouterr().out)["open"]
-
-
-def test_a_draft_without_a_log_has_comments(tmp_path: Path) -> None:
-    card = tmp_path / "empty.toml"
-    assert main(["card", "new", "-o", str(card), "--draft"]) == 0
-    assert "# final_drive = ..." in card.read_text(encoding="utf-8")
 
 
 def test_a_damaged_log_is_refused(tmp_path: Path) -> None:

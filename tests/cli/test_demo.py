@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.estimation.result.method import DEFAULT_METHOD
+
+DEFAULT_METHOD = "likelihood"
 
 
 def test_demo_compares_both_methods_with_the_truth(

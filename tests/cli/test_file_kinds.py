@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin._util.request import FileRole
-from drivetwin.cli.file_kinds import find_twin, recognise_file, require_kind
+from drivetwin.cli.file_kinds import recognise_file, require_kind
 from drivetwin.errors import CardError, FileFormatError, ResultFileError
 
 CARD = 'name = "truck"\nfinal_drive = 5.0\n[[gears]]\nname = "2"\n[elements.B2]\nP0_bar = 0.8\n'
@@ -91,20 +91,3 @@ def test_a_wrong_kind_is_named_with_the_remedy(
     with pytest.raises(error, match=f"this is {found}, not {wanted}") as fault:
         require_kind(file, wanted)
     assert remedy in str(fault.value)
-
-
-def test_what_is_not_recognised_is_left_to_its_reader(tmp_path: Path) -> None:
-    damaged = tmp_path / "twin.toml"
-    damaged.write_text(CONTENTS["damaged twin"][0], encoding="utf-8")
-    for wanted in (FileRole.TWIN, FileRole.LOG, FileRole.CARD):
-        require_kind(damaged, wanted)
-        require_kind(tmp_path / "missing", wanted)
-
-
-def test_a_folder_or_a_result_stands_for_the_twin_beside_it(tmp_path: Path) -> None:
-    result, twin = tmp_path / "result.json", tmp_path / "twin.toml"
-    result.write_text(CONTENTS["result"][0], encoding="utf-8")
-    with pytest.raises(ResultFileError, match=r"no twin\.toml"):
-        find_twin(tmp_path)
-    twin.write_text(TWIN, encoding="utf-8")
-    assert find_twin(tmp_path) == find_twin(result) == find_twin(twin) == twin

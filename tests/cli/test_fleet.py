@@ -9,13 +9,11 @@ import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.fleet.mixed_model.observations import collect_facts
-from drivetwin.fleet.rows import RowKind
-from drivetwin.fleet.store import Store
 from tests.support.synthetic_fleet import make_fleet
 
 COUNT = 8
@@ -51,22 +49,23 @@ def test_a_second_run_computes_nothing_and_tells_events(
     assert bad["error"] == "FileFormatError"
 
 
-def test_the_store_holds_what_a_log_told(fleet: Path) -> None:
-    with Store(fleet / "store") as store:
-        kinds = set(store.read_rows().column("kind").to_pylist())
-        rows = store.read_rows(RowKind.PARAMETER).to_pylist()
-        known = collect_facts(store)
-        shifts = store.read_table("shifts")
-    assert kinds >= {"parameter", "friction", "fit", "quality"}
-    values = {row["name"]: row for row in rows}
+def test_the_store_holds_the_results_of_each_log(
+    fleet: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def ask(sql: str) -> list[dict[str, Any]]:
+        assert main(["fleet", "query", str(fleet / "store"), sql, "--json"]) == 0
+        rows: list[dict[str, Any]] = json.loads(capsys.readouterr().out)["rows"]
+        return rows
+
+    values = {row["name"]: row for row in ask("SELECT * FROM parameters WHERE unit = '00'")}
     assert values["eta"]["value"] == pytest.approx(0.85, abs=0.01)
     assert values["mu.B3"]["at"] == 50.0
     assert values["P0.B3"]["free_std"] > values["P0.B3"]["std_noise"]
-    assert {fact.unit for _, fact in known.values()} == {f"{unit:02d}" for unit in range(COUNT)}
-    assert all(0.0 <= fact.fields["odometer_Mm"] <= 200.0 for _, fact in known.values())
-    assert [(row["start_gear"], row["end_gear"], row["state"]) for row in shifts] == COUNT * [
-        ("2", "3", "used")
-    ]
+    etas = ask("SELECT unit, odometer_Mm FROM parameters WHERE name = 'eta' ORDER BY unit")
+    assert [row["unit"] for row in etas] == [f"{unit:02d}" for unit in range(COUNT)]
+    assert all(0.0 <= row["odometer_Mm"] <= 200.0 for row in etas)
+    shifts = ask("SELECT start_gear, end_gear, state FROM shifts")
+    assert [tuple(row.values()) for row in shifts] == COUNT * [("2", "3", "used")]
 
 
 def test_the_report_links_to_single_ones_with_one_library(
@@ -122,10 +121,7 @@ def test_logs_of_other_settings_are_told(
 
 def test_questions_are_answered(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
     store = str(fleet / "store")
-    sql = "SELECT unit, odometer_Mm, value FROM parameters WHERE name = 'eta' ORDER BY unit"
-    assert main(["fleet", "query", store, sql, "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)["rows"]
-    assert [row["unit"] for row in rows] == [f"{unit:02d}" for unit in range(COUNT)]
+    sql = "SELECT unit, value FROM parameters WHERE name = 'eta' ORDER BY unit"
     for name in ("answer.csv", "answer.parquet"):
         assert main(["fleet", "query", store, sql, "-o", str(fleet / name)]) == 0
         assert (fleet / name).stat().st_size > 100

@@ -10,8 +10,6 @@ from typing import Any
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.fleet.rows import RowKind
-from drivetwin.fleet.store import Store
 from tests.support.synthetic_fleet import Truth, make_fleet, plan
 
 MOST = 4.0
@@ -43,12 +41,10 @@ def test_a_log_beyond_its_time_is_done_when_it_is_given_more(
     enough = _run(logs, capsys, "--retry")
     assert (enough["done"], enough["computed"], enough["failures"]) == (1, 1, {})
     (made,) = plan(1, Truth())
-    with Store(logs.parent / "store") as store:
-        parameters = {row["name"]: row for row in store.read_rows(RowKind.PARAMETER).to_pylist()}
-        kinds = set(store.read_rows().column("kind").to_pylist())
-        (settings,) = store.read_table("settings")
-    assert kinds >= {"parameter", "friction", "fit", "quality"}
-    assert json.loads(settings["document"])["method"] == "likelihood"
+    sql = "SELECT * FROM parameters"
+    assert main(["fleet", "query", str(logs.parent / "store"), sql, "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    parameters = {row["name"]: row for row in rows}
     assert parameters["eta"]["method"] == "likelihood"
     truths = {"mu.B3": made.mu, "P0.B3": made.P0}
     for name, true in truths.items():

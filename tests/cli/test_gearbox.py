@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-import drivetwin.gearbox
 from drivetwin.cli import main
+
+CARDS = Path(__file__).parents[2] / "python" / "drivetwin" / "gearbox" / "cards"
 
 
 def test_without_a_card_it_lists_the_built_in_ones(capsys: pytest.CaptureFixture[str]) -> None:
@@ -39,7 +40,7 @@ def test_a_ratio_that_is_not_the_published_one_is_told(
 
 def wrong_teeth(name: str) -> str:
     """A built-in card with a wrong tooth count."""
-    text = (Path(drivetwin.gearbox.__file__).parent / "cards" / f"{name}.toml").read_text("utf-8")
+    text = (CARDS / f"{name}.toml").read_text("utf-8")
     return text.replace("ring_teeth = 96", "ring_teeth = 69", 1)
 
 

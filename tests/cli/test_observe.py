@@ -11,11 +11,8 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.cli.observe import collect_channels
-from drivetwin.errors import DamagedChannelError
-from drivetwin.logs.formats.detect import open_recording
-from drivetwin.observer.observe import estimate_torques
+from drivetwin.logs.read import read_raw
 from drivetwin.observer.result import Band, Observation
-from drivetwin.shifts.detect import FoundShifts
 from tests.observer.conftest import Bench, bench
 from tests.shifts.test_shift_split_gears import CHAIN
 
@@ -33,8 +30,7 @@ def test_writes_torques_with_their_deviation(
     assert shift["torques"]["output_torque"]["highest"] > 4000.0
     assert "95 % band" in files[-1].read_text(encoding="utf-8")
     for file in files[:-1]:
-        with open_recording(file) as recording:
-            columns = {c.name: recording.load(k) for k, c in enumerate(recording.columns)}
+        columns = {channel.name: channel for channel in read_raw(file).channels}
         dot = "_" if file.suffix == ".mat" else "."
         names = ("output_torque", f"torque{dot}B2", f"torque{dot}B3")
         assert set(columns) == {name + end for name in names for end in ("", "_std")}
@@ -42,36 +38,6 @@ def test_writes_torques_with_their_deviation(
         exact = np.interp(torque.time, bench.motion.time, bench.motion.shaft_torque)
         assert np.sqrt(np.mean((torque.values - exact) ** 2)) < 20.0
         assert (columns["output_torque_std"].values > 0.0).all()
-
-
-def test_a_shift_with_a_gap_is_left_out_and_told(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Of several shifts; a log whose only shift has one is refused."""
-    whole = estimate_torques(bench.twin, bench.log, bench.shift)
-    refusal = DamagedChannelError("a gap", "record it again")
-    shifts = [bench.shift] * 2
-    answers: list[DamagedChannelError | Observation] = [refusal, whole]
-
-    def estimate(*_: object) -> Observation:
-        answer = answers.pop(0)
-        if isinstance(answer, DamagedChannelError):
-            raise answer
-        return answer
-
-    monkeypatch.setattr("drivetwin.observer.observe.estimate_torques", estimate)
-    monkeypatch.setattr(
-        "drivetwin.shifts.detect.require_shifts", lambda *_: FoundShifts(tuple(shifts), ())
-    )
-    command = ["observe", *map(str, bench.files), "--json"]
-    assert main(command) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert len(document["shifts"]) == 1
-    assert list(document["left_out"].values()) == ["a gap"]
-    shifts.pop()
-    answers.append(refusal)
-    assert main(command) == 2
-    assert json.loads(capsys.readouterr().out)["error"]["what"] == "a gap"
 
 
 def test_time_increases_from_shift_to_shift() -> None:

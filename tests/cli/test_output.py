@@ -7,15 +7,11 @@ import os
 import pty
 import subprocess
 import sys
-from io import StringIO
+from pathlib import Path
 
 import pytest
-from rich.console import Console
 
-from drivetwin._util.progress import notify_progress
 from drivetwin.cli import main
-from drivetwin.cli.output import print_blocks, print_line, show_step
-from drivetwin.report.blocks import make_table
 from tests.cli.conftest import Files
 
 COMMANDS = ("inspect", "shifts")
@@ -37,31 +33,19 @@ def test_tables_keep_within_the_terminal_and_cut_nothing(
     assert "…" not in text
 
 
-def test_texts_are_folded_and_numbers_stay_whole(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("COLUMNS", "24")
-    row = ("a_channel_with_a_long_name", "-1234567.25")
-    print_blocks([make_table("title", ("name", ("value", "s")), [row])])
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 24
-    assert any("-1234567.25" in line for line in lines)
-    assert "…" not in "".join(lines)
-
-
 def test_texts_in_brackets_and_between_colons_are_shown_as_they_are(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As markup a unit `[bar]` would vanish and `[/min]` be an error."""
     monkeypatch.setenv("COLUMNS", "80")
-    rows = [("PrsBrk2\\XCP:on:1", "[bar]"), ("SpdIn", "[/min]")]
-    print_blocks([make_table("of [bar].csv", ("column", "unit"), rows)])
-    print_line("[bar] :on:")
+    log = tmp_path / "[bar] :on:.csv"
+    rows = "".join(f"{0.01 * k:.2f},{k},{k % 3}\n" for k in range(20))
+    log.write_text(f"time,PrsBrk2\\XCP:on:1,[bar]\ns,bar,[/min]\n{rows}")
+    assert main(["inspect", str(log)]) == 0
     text = capsys.readouterr().out
-    assert "of [bar].csv" in text
-    assert "PrsBrk2\\XCP:on:1" in text
-    assert text.count("[bar]") == 3
-    assert "[/min]" in text
+    for one in ("[bar] :on:.csv", "PrsBrk2\\XCP:on:1", "[/min]"):
+        assert one in text
+    assert text.count("[bar]") > 1
 
 
 def on_a_terminal(*arguments: str, **settings: str) -> str:
@@ -88,25 +72,3 @@ def on_a_terminal(*arguments: str, **settings: str) -> str:
 def test_colour_is_for_terminals_that_want_it() -> None:
     assert "\x1b[1;31m" in on_a_terminal("report", "none.json", NO_COLOR="")
     assert "\x1b[1;31m" not in on_a_terminal("report", "none.json", NO_COLOR="1")
-
-
-def test_colour_is_off_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["report", "none.json"]) == 2
-    assert "\x1b" not in capsys.readouterr().err
-
-
-def test_a_terminal_sees_what_is_being_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = StringIO()
-    monkeypatch.setattr(
-        "drivetwin.cli.output.make_console",
-        lambda **_: Console(file=screen, force_terminal=True, width=80),
-    )
-    with show_step("reading log.csv"):
-        notify_progress(0.5)
-    assert "reading log.csv" in screen.getvalue()
-
-
-def test_a_step_is_silent_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
-    with show_step("reading log.csv"):
-        notify_progress(0.5)
-    assert capsys.readouterr() == ("", "")

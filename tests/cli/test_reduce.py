@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-import drivetwin.gearbox
 from drivetwin.cli import main
 
-CARDS = Path(drivetwin.gearbox.__file__).parent / "cards"
+CARDS = Path(__file__).parents[2] / "python" / "drivetwin" / "gearbox" / "cards"
 
 
 def test_the_table_names_ratios_members_and_errors(capsys: pytest.CaptureFixture[str]) -> None:

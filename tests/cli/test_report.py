@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
@@ -13,15 +12,14 @@ from drivetwin.cli import main
 from drivetwin.files.result_file import save_result
 from drivetwin.files.twin_file import save_twin
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import attach_fit
 from tests.cli.conftest import Files
-from tests.report.sample import card, identification, validation
+from tests.report.sample import card, simulated
 
 
 @pytest.fixture
 def made(tmp_path: Path) -> tuple[Path, Path]:
     """Two folders as `identify -o` writes them, without their page."""
-    found = attach_fit(identification(), [validation()])
+    found = simulated()
     for name in ("first", "second"):
         save_result(tmp_path / name / "result.json", found)
         save_twin(tmp_path / name / "twin.toml", build_twin(found, card()))
@@ -36,18 +34,6 @@ def test_several_results_are_compared_on_one_page(
     assert capsys.readouterr().out.strip() == f"wrote {page}"
     text = page.read_text(encoding="utf-8")
     assert "Comparison of first, second, first 2" in text
-
-
-def test_sources_of_one_name_are_numbered_after_it(
-    made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folders = [tmp_path / "a" / "run 1", tmp_path / "b" / "run 1", tmp_path / "a" / "run 2"]
-    for folder in folders:
-        shutil.copytree(made[0], folder)
-    page = tmp_path / "page.html"
-    assert main(["report", *map(str, folders), "-o", str(page)]) == 0
-    capsys.readouterr()
-    assert "Comparison of run 1, run 1 2, run 2" in page.read_text(encoding="utf-8")
 
 
 def test_a_twin_is_shown_over_logs(

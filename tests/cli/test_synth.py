@@ -15,20 +15,6 @@ from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.card import load_card
 
 
-def test_writes_log_card_and_truth_and_nothing_else(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    log = tmp_path / "run.csv"
-    assert main(["synth", "-o", str(log), "--scenario", "paper", "--json"]) == 0
-    captured = capsys.readouterr()
-    named = json.loads(captured.out)
-    assert {Path(path).name for path in named.values()} == {
-        path.name for path in tmp_path.iterdir()
-    }
-    assert named["log"] == str(log)
-    assert log.read_text().startswith("time,EngTrq,")
-
-
 def test_same_arguments_write_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a", "b"):
         assert main(["synth", "-o", str(tmp_path / name / "x.csv"), "--seed", "5"]) == 0

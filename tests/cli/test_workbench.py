@@ -23,14 +23,6 @@ def _app(files: Files, *arguments: str) -> int:
     return main(["app", "--folder", str(files.log.parent), "--no-browser", *arguments])
 
 
-def test_it_listens_on_this_machine_alone(
-    bench_files: Files, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert _app(bench_files, "--port", "0") == 0
-    told = capsys.readouterr().out
-    assert "http://127.0.0.1:" in told
-
-
 def test_a_log_outside_the_folder_is_refused(
     bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

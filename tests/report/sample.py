@@ -10,14 +10,16 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.validation import SignalTrace, Validation, compute_fit
+from drivetwin.estimation.result.validation import compute_fit
 from drivetwin.findings import Code, report
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import clip_phases
-from drivetwin.vehicle.card import ElementSpec, Gear, PriorValue, VehicleCard
+from drivetwin.validation.simulate_log import SignalTrace, Validation, attach_fit, clip_phases
+from drivetwin.vehicle.card import ElementSpec, Gear
 from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.arrays import FloatArray
 
 TIME = np.arange(0.0, 3.0, 1e-3)
@@ -217,3 +219,8 @@ def identification() -> Identification:
         correlation_ids=("eta", "J_prime_2"),
         correlation=np.array([[1.0, 0.6], [0.6, 1.0]]),
     )
+
+
+def simulated() -> Identification:
+    """The identification with the fit of its simulation."""
+    return attach_fit(identification(), [validation()])
