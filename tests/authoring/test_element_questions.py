@@ -4,18 +4,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.authoring.card_text import format_card
-from drivetwin.authoring.element_questions import format_converter, parse_converter
-from drivetwin.authoring.options import CardOptions, parse_options
-from drivetwin.authoring.questions import Sources
-from drivetwin.authoring.session import Session
 from drivetwin.errors import InputError
-from drivetwin.vehicle.card import load_card
+from tests.authoring.sessions import load_session, make_session
 
 MAP = "0:1.9:900, 0.8:1.09:640, 1:1:0"
 PLAIN = {
@@ -24,28 +20,19 @@ PLAIN = {
 }  # fmt: skip
 
 
-def _make_session(converter: str) -> Session:
-    options = CardOptions({**PLAIN, "--converter": converter}, ["P0_bar=0.8,gain_m3=0.03"])
-    return Session(parse_options(options, Sources("truck")), Sources("truck"))
+def _make_session(converter: str) -> Any:
+    return make_session({**PLAIN, "--converter": converter}, ["P0_bar=0.8,gain_m3=0.03"])
 
 
 def test_a_map_comes_back_from_the_card(tmp_path: Path) -> None:
     session = _make_session(MAP)
     session.fill_defaults()
-    path = tmp_path / "card.toml"
-    path.write_text(format_card(session.answers))
-    converter = load_card(path).converter
+    converter = load_session(session, tmp_path).converter
     assert converter is not None
     assert converter.speed_ratio == (0.0, 0.8, 1.0)
     assert converter.torque_ratio == (1.9, 1.09, 1.0)
     pump = float(converter.compute_pump_torque(104.72, 0.0))
     assert pump == pytest.approx(900.0, rel=1e-4)
-
-
-@pytest.mark.parametrize("text", ["none", " None "])
-def test_none_states_no_map(text: str) -> None:
-    assert parse_converter(text) is None
-    assert not list(format_converter({}))
 
 
 @pytest.mark.parametrize(
@@ -61,8 +48,6 @@ def test_none_states_no_map(text: str) -> None:
     ],
 )
 def test_a_map_that_cannot_be_is_refused_with_the_reason(text: str, why: str) -> None:
-    with pytest.raises(ValueError, match=why):
-        parse_converter(text)
     with pytest.raises(InputError, match=why):
         _make_session(text)
 
@@ -70,9 +55,8 @@ def test_a_map_that_cannot_be_is_refused_with_the_reason(text: str, why: str) ->
 @given(st.text(alphabet="0123456789.:,; -+en", max_size=40))
 def test_any_text_is_a_map_or_refused(text: str) -> None:
     try:
-        points = parse_converter(text)
-    except ValueError as fault:
-        assert str(fault)  # noqa: PT017
+        session = _make_session(text)
+    except InputError as fault:
+        assert "--converter" in str(fault)  # noqa: PT017
     else:
-        assert points is not None
-        assert len(points) >= 2
+        assert session.answers

@@ -4,17 +4,19 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
-from drivetwin.authoring.gearboxes import (
-    list_forward_gears,
-    match_gearboxes,
-    reduce_gears,
-    refuse_irreducible,
-)
-from drivetwin.errors import CardError
+from drivetwin.authoring.gearboxes import list_forward_gears, match_gearboxes
+from drivetwin.errors import CardError, InputError
 from drivetwin.gearbox import list_builtin_gearboxes
+from tests.authoring.sessions import load_session, make_draft
+
+STATED = {
+    "--final-drive": "4.88", "--engine-inertia": "4..20", "--vehicle-inertia": "2500..6500",
+}  # fmt: skip
+ELEMENTS = ["P0_bar=0.8,gain_m3=0.03"]
 
 
 @pytest.mark.parametrize("name", list_builtin_gearboxes())
@@ -32,34 +34,27 @@ def test_strange_ratios_fit_no_gearbox() -> None:
 
 
 @pytest.mark.parametrize("name", list_builtin_gearboxes())
-def test_neighbouring_gears_have_consistent_ratios(name: str) -> None:
-    gears = tuple(list_forward_gears(name))
-    for low, high in pairwise(gears):
+def test_neighbouring_gears_have_consistent_ratios(name: str, tmp_path: Path) -> None:
+    for low, high in pairwise(list_forward_gears(name)):
+        single = {**STATED, "--gearbox": name, "--gears": f"{high},{low}"}
         if name == "manual-6":
-            with pytest.raises(CardError, match="dog"):
-                reduce_gears(name, (low, high))
+            with pytest.raises((CardError, InputError), match="dog"):
+                make_draft(None, single, ELEMENTS)
             continue
-        elements = reduce_gears(name, (high, low))
-        assert [one.gear for one in elements] == [low, high]
-        for one in elements:
-            assert one.i_c * one.i_out == pytest.approx(one.ratio, rel=1e-5)
+        card = load_session(make_draft(None, single, ELEMENTS), tmp_path)
+        assert [gear.name for gear in card.gears] == [low, high]
+        for gear in card.gears:
+            element = card.get_element(gear.elements[0])
+            assert element.i_c is not None
+            assert element.i_out is not None
+            product = element.i_c.value * element.i_out.value
+            assert product == pytest.approx(gear.ratio.value, rel=1e-5)
 
 
-def test_a_gearbox_of_dogs_alone_is_refused_as_a_whole() -> None:
-    for name in list_builtin_gearboxes():
-        if name == "manual-6":
-            with pytest.raises(CardError, match="dog"):
-                refuse_irreducible(name)
-        else:
-            refuse_irreducible(name)
-
-
-def test_gears_of_several_shifts_need_one_element_each() -> None:
-    four = reduce_gears("three-set-3000", ("1", "2", "3", "4"))
-    assert [one.element for one in four] == ["C5", "C4", "C3", "C2"]
-    with pytest.raises(CardError, match="LOW,HIGH"):
-        reduce_gears("zf-8hp70", ("1", "2", "3"))
-    with pytest.raises(CardError, match="no gear 9"):
-        reduce_gears("zf-8hp70", ("1", "9"))
-    with pytest.raises(CardError, match="alone"):
-        reduce_gears("zf-8hp70", ("1",))
+def test_gears_of_several_shifts_need_one_element_each(tmp_path: Path) -> None:
+    single = {**STATED, "--gearbox": "three-set-3000", "--gears": "1,2,3,4"}
+    card = load_session(make_draft(None, single, ELEMENTS), tmp_path)
+    assert [gear.elements[0] for gear in card.gears] == ["C5", "C4", "C3", "C2"]
+    for gears, said in (("1,2,3", "LOW,HIGH"), ("1,9", "no gear 9"), ("1", "alone")):
+        with pytest.raises((CardError, InputError), match=said):
+            make_draft(None, {**STATED, "--gearbox": "zf-8hp70", "--gears": gears}, ELEMENTS)

@@ -10,21 +10,20 @@ from typing import Any
 import numpy as np
 
 from drivetwin.calibration.driven import DrivenShift
-from drivetwin.calibration.input_path import DIRECT, InputPath
+from drivetwin.calibration.input_path import DIRECT
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
-from drivetwin.calibration.profiles import Profiles
 from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.dyno.scenario import Sensor
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import TorqueError
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
-from drivetwin.shifts.detect import require_shifts
-from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
+from drivetwin.shifts.detect import detect_shifts
+from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.driveline_run import DrivelineTask
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch
+from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import LoggedShift
 from tests.calibration.cases import SYSTEM
@@ -45,15 +44,6 @@ REQUEST = 1.5
 """Request in the logs of the bench [s]."""
 
 
-def build_profiles(shift: Maneuver, **values: float) -> Profiles:
-    """Return the profiles of the controller's policy, with other starting values."""
-    policy = POLICIES[PolicyKind.CONTROLLER](PolicySetup(shift, SYSTEM, None, 0.01))
-    policy = policy.set_start(values)
-    control = policy.build_control(np.array([one.start for one in policy.parameters]))
-    assert isinstance(control, Profiles)
-    return control
-
-
 def drive(
     twin: Twin,
     path: Path,
@@ -69,11 +59,11 @@ def drive(
     """
     profiles = write_bench_log(path, model, **bench)
     log, card = read_log(path, twin.build_card()), twin.build_card()
-    logged = LoggedShift(log, require_shifts(log, card).shifts[0])
+    logged = LoggedShift(log, detect_shifts(log, card).shifts[0])
     if not known:
         return DrivenShift(logged)
     moved = (replace(one, time=one.time + stated_late) for one in profiles.signals.values())
-    return DrivenShift(logged, Profiles(*moved), REQUEST + stated_late)
+    return DrivenShift(logged, type(profiles)(*moved), REQUEST + stated_late)
 
 
 def write_bench_log(
@@ -81,21 +71,22 @@ def write_bench_log(
     model: DualClutch,
     late: float = 0.0,
     seed: int = 1,
-    added: AddedElements = NO_ADDED_ELEMENTS,
-    way: InputPath = DIRECT,
-) -> Profiles:
+    added: Any = NO_ADDED_ELEMENTS,
+    way: Any = DIRECT,
+) -> Any:
     """Write the log of a power-on upshift of a driveline with the starting values of the policy.
 
     Pressures act `late` [s] behind the logged ones, and all inputs by their `way`. Returns the
     commanded profiles on the clock of the log.
     """
     shift = Maneuver(model, OperatingPoint(1400.0, 175.0), 0.5, request=REQUEST, horizon=4.0)
-    given = build_profiles(shift)
+    policy = POLICIES[PolicyKind.CONTROLLER](PolicySetup(shift, SYSTEM, None, 0.01))
+    given: Any = policy.build_control(np.array([one.start for one in policy.parameters]))
     seen = list_sampling_instants(SENSORS, shift.horizon)
     pressures = {"B2": given.offgoing, "B3": given.oncoming}
     late_way = replace(way, pressure_delay=late)
     acting = late_way.apply(given.engine_torque, pressures, model.elements, shift.time)
-    torque = acting.pop(ENGINE_TORQUE)
+    torque = acting.pop("engine torque")
     run = DrivelineTask(model, added, torque, acting, shift.build_start(), seen).simulate()
     inputs = {
         "engine_torque": given.engine_torque,

@@ -11,11 +11,10 @@ import numpy as np
 
 from drivetwin.calibration.calibrate import Task, draw_for
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import list_outputs
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.profiles import ClosedLoop, Control, Profiles, compute_nominal_profiles
-from drivetwin.calibration.scenarios import Purpose, Scenarios, collect_scenarios
+from drivetwin.calibration.profiles import ClosedLoop, compute_nominal_profiles
+from drivetwin.calibration.scenarios import Purpose, collect_scenarios
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.twin.twin import Twin
@@ -81,33 +80,33 @@ def make_task_with(values: Mapping[str, float], kind: PolicyKind = PolicyKind.CO
     return make_task(twin=extend_twin(make_hydraulic_twin(), values), policy=kind)
 
 
-def start(task: Task) -> Control:
+def start(task: Task) -> Any:
     """Return the control of the starting values."""
     return task.policy.build_control(np.array([one.start for one in task.policy.parameters]))
 
 
-def start_profiles(task: Task) -> Profiles:
+def start_profiles(task: Task) -> Any:
     """Return the profiles at the clutches of the nominal driveline for the starting values."""
     return compute_nominal_profiles(task.maneuver, start(task))
 
 
-def draw(task: Task, count: int, purpose: str = "SEARCH") -> Scenarios:
+def draw(task: Task, count: int, purpose: str = "SEARCH") -> Any:
     """Draw scenarios of a task."""
     return draw_for(task, count, Purpose[purpose])
 
 
-def make_nominal(task: Task, control: Control) -> Scenarios:
+def make_nominal(task: Task, control: Any) -> Any:
     """Return the nominal driveline, with its actuators for a closed loop."""
     nominal = collect_scenarios(task.maneuver, [task.maneuver.driveline])
     return replace(nominal, units=[control.unit]) if isinstance(control, ClosedLoop) else nominal
 
 
-def make_plant(shift: Maneuver) -> Plant:
+def make_plant(shift: Any) -> Plant:
     """Plant on one thread."""
     return Plant(shift, threads=1)
 
 
-def run_nominal(task: Task, control: Control) -> FloatArray:
+def run_nominal(task: Task, control: Any) -> FloatArray:
     """Return shaft torque, and torque and slip of both elements (5, n), nominal."""
     shift, nominal = task.maneuver, make_nominal(task, control)
     runs = make_plant(shift).simulate(control, nominal, list_outputs(shift))

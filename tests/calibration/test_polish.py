@@ -9,17 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from drivetwin.calibration.calibrate import Exchange
 from drivetwin.calibration.keep_limits import Repair
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, Statistic
 from drivetwin.calibration.polish import Linear, assemble_program, polish
-from drivetwin.calibration.search import search_minima
-from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.errors import InputError
 from tests.support.arrays import FloatArray
 
 DRAWS = np.linspace(-1.0, 1.0, 20)
@@ -54,12 +49,6 @@ def test_keeps_a_limit_that_costs_comfort() -> None:
     found = polish(_run, np.array([0.5, 0.1]), objective, 40)
     assert found.coordinates[1] == pytest.approx(0.5, abs=2e-3)
     assert found.value == pytest.approx(10.0, abs=0.3)
-
-
-def test_never_returns_worse_than_the_start() -> None:
-    objective = Objective((), 0.9, 1.0)
-    start = np.array([0.61, 0.0])
-    assert polish(_run, start, objective, 3).value <= objective.evaluate(_run_one(start))
 
 
 def test_program_with_few_rows_has_the_minimum_of_all_rows() -> None:
@@ -115,26 +104,6 @@ def test_penalties_are_relative_to_the_bound_and_by_the_share_of_second_slips() 
     assert Objective((), 0.9, 1.0).evaluate(twenty) == 18.5  # mean of the largest tenth
 
 
-@pytest.mark.parametrize("bound", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_bound_is_positive(bound: float) -> None:
-    with pytest.raises(InputError, match=r"number in m/s³"):
-        Limit(Metric.PEAK_JERK, bound)
-
-
-def test_search_finds_a_minimum_also_on_a_bound() -> None:
-    centre = np.array([0.3, 0.7, 0.0, 0.5])
-    effort = CalibrationSettings(
-        starts=3, finalists=2, population=10, first_evaluations=100, evaluations=600
-    )
-    found = search_minima(
-        lambda every: [float(np.sum((at - centre) ** 2)) for at in every],
-        np.full(4, 0.5), effort, seed=1,
-    )  # fmt: skip
-    assert len(found) == 2
-    assert found[0].value <= found[1].value
-    assert found[0].coordinates == pytest.approx(centre, abs=1e-2)
-
-
 LIMITS = (Limit(Metric.SHIFT_TIME, 0.7), Limit(Metric.FRICTION_ENERGY, 4e4))
 KEPT = Objective(LIMITS, 0.9, 100.0)
 
@@ -151,47 +120,3 @@ def test_a_polish_that_always_exceeds_its_bounds_is_led_within_them(beyond: floa
 
     start = np.array([(1.0 + beyond) * one.bound for one in LIMITS])
     assert Repair(measure, improve, 3, 3.0).keep_limits(start, KEPT).excess <= 1e-12
-
-
-def test_bounds_fall_and_the_weight_rises_until_the_limits_hold() -> None:
-    seen: list[Objective] = []
-
-    def improve(at: FloatArray, under: Objective) -> FloatArray:
-        seen.append(under)
-        return np.asarray(at - np.array([0.01, 0.0]))
-
-    kept = Repair(measure, improve, 5, 3.0).keep_limits(np.array([0.714, 3e4]), KEPT)
-    assert kept.coordinates == pytest.approx([0.694, 3e4])
-    assert [one.weight for one in seen] == [300.0, 900.0]
-    bounds = [0.7 / 1.02, 0.7 / 1.02 / (0.704 / 0.7)]
-    assert [one.limits[0].bound for one in seen] == pytest.approx(bounds)
-    assert {one.limits[1].bound for one in seen} == {4e4}
-
-
-def test_the_least_excess_is_returned_where_none_keeps_the_limits() -> None:
-    values = iter([0.9, 0.8, 0.95])
-
-    def improve(at: FloatArray, _: Objective) -> FloatArray:
-        return np.array([next(values), at[1]])
-
-    kept = Repair(measure, improve, 3, 3.0).keep_limits(np.array([0.85, 3e4]), KEPT)
-    assert kept.coordinates[0] == 0.8
-    assert kept.excess == pytest.approx(0.8 / 0.7 - 1.0)
-
-
-@pytest.mark.parametrize(("step", "held"), [(None, 0.8), (-0.15, 0.3)])
-def test_units_that_slip_again_join_while_a_polish_gains(step: float | None, held: float) -> None:
-    """Each of four units needs a pressure to stay locked; jerk grows with the pressure."""
-    needed = np.array([0.1, 0.2, 0.4, 0.8])
-
-    def assess(at: FloatArray) -> Outcome:
-        jerk, no = np.full(4, 10.0 * at[0]), np.zeros(4, np.bool_)
-        return Outcome({Metric.PEAK_JERK: jerk}, np.zeros((4, 3)), no, at[0] < needed)
-
-    def improve(at: FloatArray, joined: NDArray[np.bool_]) -> FloatArray:
-        return np.array([needed[joined].max(initial=0.0)]) if step is None else at + step
-
-    exchange = Exchange(assess, improve, rounds=3)
-    found = exchange.hold_lockup(np.array([0.3]), Objective((), 0.5, 100.0))
-    assert found.coordinates.tolist() == [held]
-    assert found.joined.tolist() == [False, False, step is None, step is None]

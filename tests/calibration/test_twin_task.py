@@ -13,7 +13,6 @@ from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.oil import OilFriction
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.scenarios import draw_types
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import IdentificationError, InputError
@@ -25,7 +24,6 @@ from drivetwin.simulation.network import simulate as simulate_network
 from drivetwin.simulation.shift_control import ControlledUnit
 from tests.calibration.cases import (
     QUICK,
-    SHIFTS,
     SYSTEM,
     draw,
     make_plant,
@@ -58,16 +56,6 @@ def test_operating_point_and_limits_come_from_the_twin() -> None:
         Metric.VIBRATION_DOSE,
         Metric.FRICTION_ENERGY,
     ]
-
-
-def test_the_wheel_radius_is_that_of_the_request_then_that_of_the_twin() -> None:
-    car = replace(make_twin(), wheel_radius=0.31)
-    for twin, request, radius in (
-        (car, REQUEST, 0.31),
-        (car, replace(REQUEST, wheel_radius=0.3), 0.3),
-        (make_twin(), REQUEST, 0.5),
-    ):
-        assert build_task(twin, replace(request, limits=())).maneuver.wheel_radius == radius
 
 
 def test_draws_have_the_covariance_of_the_twin() -> None:
@@ -112,15 +100,6 @@ def test_draws_contain_the_part(part: str) -> None:
         assert np.unique(sets[path]).size == 600
     else:
         assert sets[path].std() / sets[path].mean() == pytest.approx(std, rel=0.08)
-
-
-def test_a_part_without_an_interval_is_held() -> None:
-    twin = extend_twin(make_twin(), ADDED_ELEMENTS["backlash"])
-    ids, covariance = make_twin().covariance_ids, make_twin().covariance
-    known = replace(twin, covariance_ids=ids, covariance=covariance)
-    task = build_task(known, replace(REQUEST, limits=()))
-    assert task.maneuver.added.gap == 0.02
-    assert "output shaft.gap" not in draw(task, 20).sets
 
 
 def test_a_twin_without_identified_values_is_refused() -> None:
@@ -212,33 +191,6 @@ def test_draws_follow_seed_and_purpose_and_keep_their_units() -> None:
         assert np.array_equal(both.sets[name], values[order])
 
 
-def test_impossible_draws_are_not_run() -> None:
-    task = make_task()
-    body = task.maneuver.driveline
-    broken = replace(body, model=replace(body.model, k_o=-1.0))
-    draws = replace(task.draw, driveline=lambda _: lambda _: broken)
-    with pytest.raises(InputError, match="0 of 100 drawn drivelines"):
-        draw(replace(task, draw=draws), 5)
-
-
-@pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])
-def test_a_spread_is_finite_and_not_negative(value: float) -> None:
-    with pytest.raises(InputError, match="spread of gain"):
-        Spread(gain=value)
-
-
-def test_types_share_the_random_numbers_of_their_units() -> None:
-    task = make_task(oil_temperature=380.0, oil=OilFriction(-2e-3, 6e-4, log_temperature=340.0))
-    drawn = draw_types(task.maneuver, task.draw, 3, 40, 1)
-    contact = drawn.sets["B2.p0"].reshape(3, 40)
-    stiffness = drawn.sets["output shaft.stiffness"].reshape(3, 40)
-    assert (stiffness == stiffness[:, :1]).all()
-    assert len(set(stiffness[:, 0])) == 3
-    spread = contact - contact[:, :1]
-    assert spread[1] == pytest.approx(spread[0], abs=1e-6)
-    assert spread.std() == pytest.approx(5e3, rel=0.3)
-
-
 def test_oil_changes_the_friction_of_a_type_and_its_temperature_that_of_a_unit() -> None:
     exact = make_exact_task()
     known = OilFriction(-2e-3, 6e-4, log_temperature=340.0)
@@ -275,25 +227,6 @@ def test_start_accelerates_steadily(part: str) -> None:
     expected = ratio * shift.compute_acceleration(shift.point.engine_torque, ratio)
     # A slipping tyre turns faster than the vehicle, and accelerates by as much more.
     assert rate == pytest.approx(expected, rel=0.01 if part == "tyre" else 1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "torque", "first"),
-    [
-        ("power-on upshift", -100.0, True),
-        ("power-on upshift", 0.0, False),
-        ("power-on upshift", 100.0, False),
-        ("power-off downshift", 300.0, True),
-        ("power-off downshift", -300.0, False),
-    ],
-)
-def test_the_engine_moves_by_itself_where_its_torque_has_the_direction(
-    name: str, torque: float, first: bool
-) -> None:
-    shift = make_task(**SHIFTS[name]).maneuver
-    assert shift.direction == (-1.0 if name.endswith("upshift") else 1.0)
-    point = replace(shift.point, engine_torque=torque)
-    assert replace(shift, point=point).inertia_first is first
 
 
 def test_equal_gears_are_refused() -> None:

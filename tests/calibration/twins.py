@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, RIM_SHARE
@@ -126,7 +126,7 @@ def extend_twin(twin: Twin, values: Mapping[str, float]) -> Twin:
     )
 
 
-def assemble(shift: Maneuver, values: Mapping[str, float]) -> list[Element]:
+def assemble(shift: Any, values: Mapping[str, float]) -> list[Element]:
     """Put an added element by hand into the elements of the dual clutch."""
     model = shift.model
     elements = {

@@ -156,7 +156,7 @@ def test_a_twin_with_a_part_is_calibrated_with_it(part: str, tmp_path: Path) -> 
     after = shift.time - shift.request
     inputs = {
         name: Signal(shift.time, np.interp(after, one.axis.points, one.values))
-        for name, one in zip(("engine_torque", "B2", "B3"), curves, strict=True)
+        for name, one in zip(("engine torque", "B2", "B3"), curves, strict=True)
     }
     start, outputs = shift.start, list_outputs(shift)
     run = simulate(assemble(shift, ADDED_ELEMENTS[part]), inputs, start, shift.time, outputs)

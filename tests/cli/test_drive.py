@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drivetwin.cli import main
@@ -21,6 +23,20 @@ def test_writes_page_and_traces_and_tells_every_shift(
     assert "unexplained" in text
     assert max(len(line) for line in text.splitlines()) <= max(80, len(str(tmp_path)) + 40)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"drive.html", "drive.csv"}
+    page = (tmp_path / "out" / "drive.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="https?:', page)
+    # The drive, its two shifts, the energy.
+    assert page.count("<figure>") == 4
+    # Works of engine and road, heats, and gains of stored energy close on every row.
+    names, _, *rows = (tmp_path / "out" / "drive.csv").read_text(encoding="utf-8").splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    columns = dict(zip(names.split(","), table.T, strict=True))
+    parts = [one for name, one in columns.items() if name.startswith(("work.", "heat."))]
+    parts += [one - one[0] for name, one in columns.items() if name.startswith("energy.")]
+    assert np.abs(np.sum(parts, axis=0)).max() < 1e-8 * max(np.abs(one).max() for one in parts)
+    taken = columns["pump_torque"] * columns["engine_speed"]
+    given = columns["turbine_torque"] * columns["input_speed"]
+    assert (taken - given).min() > -1e-6 * np.abs(taken).max()
 
 
 def test_json_carries_shifts_and_energy(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,25 @@ def test_the_truth_is_within_three_deviations(folder: Path) -> None:
     for name, true in read_json(folder / "k0.truth.json")["truth"].items():
         one = unknowns[name]
         assert abs(one["minimum"] - true) < 3.0 * one["std_noise"], name
+
+
+def test_the_page_names_unknowns_and_held_out_logs_and_opens_offline(folder: Path) -> None:
+    page = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    anchors = re.findall(r'<section id="([^"]+)"', page)
+    assert anchors == ["result", "recordings", "search"]
+    for text in (*read_json(folder / "k0.truth.json")["truth"], "k0.csv", "other.csv, held out"):
+        assert text in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_names_of_files_are_text_and_no_markup(folder: Path, tmp_path: Path) -> None:
+    model, log = list_inputs(folder)
+    named = tmp_path / "<i>.csv"
+    named.write_bytes(Path(log).read_bytes())
+    assert main(["fit", model, str(named), "-o", str(tmp_path / "out")]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<i>.csv" not in page
+    assert "&lt;i&gt;.csv" in page
 
 
 def test_examine_lists_improvements_and_a_profile_of_a_fit(

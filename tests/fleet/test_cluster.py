@@ -10,19 +10,14 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from drivetwin.errors import SchedulerError
-from drivetwin.fleet.cluster import DaskPool
-from drivetwin.fleet.task import WorkerSpec
 from tests.fleet.test_coordinator_faults import COUNT, undisturbed
-from tests.fleet.toys import ROOT, contents, make_logs
+from tests.fleet.toys import ROOT, contents, make_logs, run_toys
 
 pytest.importorskip("distributed")
 
@@ -96,11 +91,13 @@ def test_a_scheduler_lost_and_restarted_costs_nothing(tmp_path: Path) -> None:
     assert contents(store) == undisturbed(logs, tmp_path / "calm")
 
 
-def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("drivetwin.fleet.cluster._FIRST_CONTACT", 1.0)
-    started = time.monotonic()
+    logs, started = make_logs(tmp_path / "logs", 1), time.monotonic()
     with pytest.raises(SchedulerError, match="no Dask scheduler answers"):
-        DaskPool(f"tcp://127.0.0.1:{free_port()}", WorkerSpec(), lambda _: None)
+        run_toys(logs, tmp_path / "store", scheduler=f"tcp://127.0.0.1:{free_port()}")
     assert time.monotonic() - started < 20.0
 
 
@@ -119,20 +116,3 @@ def test_two_runs_over_the_same_logs_share_a_cluster_and_no_task(tmp_path: Path)
         ]
         assert [run.wait(100.0) for run in runs] == [0, 0]
     assert contents(stores[0]) == contents(stores[1]) == undisturbed(logs, tmp_path / "calm")
-
-
-def test_tasks_of_two_runs_have_no_key_in_common(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Dask takes tasks of one key for one: the second run would get the answer and no part."""
-    keys: list[str] = []
-
-    class Client:
-        def submit(self, *_: object, key: str, **__: object) -> Future[None]:
-            keys.append(key)
-            return Future()
-
-    monkeypatch.setattr(DaskPool, "_connect", lambda *_: Client())
-    for store in ("one", "other"):
-        pool = DaskPool("tcp://nowhere", WorkerSpec(), lambda _: None)
-        task: Any = SimpleNamespace(log="0123", part=f"{store}/0123.parquet", to_json=str)
-        pool.submit(task)
-    assert len(set(keys)) == 2

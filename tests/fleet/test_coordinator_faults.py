@@ -21,8 +21,7 @@ from typing import Any
 import pytest
 
 from drivetwin.errors import StoreError
-from drivetwin.fleet.coordinator import run_fleet
-from tests.fleet.toys import ROOT, contents, count_attempts, make_logs, request, run_toys
+from tests.fleet.toys import ROOT, contents, count_attempts, make_logs, run_toys
 from tests.support.repeats import mark_repeats
 
 COUNT = int(os.environ.get("FLEET_FAULT_LOGS", "30"))
@@ -65,8 +64,7 @@ def test_workers_killed_at_random_cost_nothing(tmp_path: Path) -> None:
             killed.append(dice.choice(workers))
             os.kill(killed[-1], signal.SIGKILL)
 
-    asked = request(logs, tmp_path / "store", attempts=50, workers=2)
-    summary = run_fleet(asked, kill_now_and_then)
+    summary, _ = run_toys(logs, tmp_path / "store", kill_now_and_then, attempts=50, workers=2)
     assert len(killed) >= 3
     assert (summary.done, summary.bad) == (COUNT - 1, 1)
     assert contents(tmp_path / "store") == undisturbed(logs, tmp_path / "calm")
@@ -184,7 +182,7 @@ def test_an_interrupted_run_tells_what_it_did_and_goes_on(tmp_path: Path) -> Non
             raise KeyboardInterrupt
 
     events: list[Any] = []
-    summary = run_fleet(request(logs, store, workers=2), interrupt)
+    summary, _ = run_toys(logs, store, interrupt, workers=2)
     assert not summary.complete
     assert 0 < len(contents(store)["rows"]) < 12
     assert run_toys(logs, store)[0].complete

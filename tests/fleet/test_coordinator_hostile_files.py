@@ -11,16 +11,13 @@ import socket
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from drivetwin.errors import INTERRUPTED, StoreError
-from drivetwin.fleet.coordinator import run_fleet
-from drivetwin.fleet.sources import Sources
-from tests.fleet.toys import contents, make_logs, names, request, run_toys
+from tests.fleet.toys import contents, make_logs, names, run_toys
 
 
 def _run_calmly(logs: Path, store: Path) -> dict[str, Any]:
@@ -46,9 +43,7 @@ def _spoil(logs: Path) -> list[str]:
 def test_what_is_no_file_is_one_bad_log_each(tmp_path: Path, pattern: str) -> None:
     logs = make_logs(tmp_path / "logs", 2)
     spoilt = _spoil(logs)
-    asked = replace(request(logs, tmp_path / "store"), sources=Sources([f"{logs}{pattern}"]))
-    events: list[Any] = []
-    summary = run_fleet(asked, events.append)
+    summary, events = run_toys(logs, tmp_path / "store", given=[f"{logs}{pattern}"])
     assert (summary.done, summary.bad) == (2, len(spoilt))
     assert names(events, state="bad") == spoilt
 
@@ -57,8 +52,7 @@ def test_a_device_of_a_list_is_a_bad_log(tmp_path: Path) -> None:
     logs = make_logs(tmp_path / "logs", 1)
     listed = tmp_path / "list.txt"
     listed.write_text(f"/dev/zero\n/dev/null\n{tmp_path}\n{logs}/unit_0/log_0000.csv\n")
-    asked = replace(request(logs, tmp_path / "store"), sources=Sources([], listed))
-    summary = run_fleet(asked, lambda _: None)
+    summary, _ = run_toys(logs, tmp_path / "store", listed=listed)
     assert (summary.done, summary.bad) == (1, 3)
 
 

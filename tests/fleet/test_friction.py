@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from drivetwin.fleet.friction import compute_fleet_friction
-from drivetwin.fleet.store import Store
-from tests.fleet.toys import fill
+from tests.fleet.toys import fill, open_store
 
 
 def test_the_middle_and_the_band_are_those_of_the_logs(tmp_path: Path) -> None:
-    with Store(tmp_path, write=True) as store:
+    with open_store(tmp_path) as store:
         assert compute_fleet_friction(store) == {}
         for number in range(101):
             slips = np.linspace(5.0 + 0.01 * number, 100.0 - 0.3 * number, 30)

@@ -6,17 +6,15 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from drivetwin import Method
 from drivetwin.cli import main
 from drivetwin.errors import FileFormatError, StoreError
-from drivetwin.fleet import scan
 from drivetwin.fleet.identify import identify_log
-from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.task import Task
+from tests.fleet.toys import scan_files
 
 
 @pytest.fixture(scope="module")
@@ -30,15 +28,12 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def _task(log: Path, *means: tuple[str, str], card: Path | None = None) -> Task:
+def _task(log: Path, *means: tuple[str, str], card: Path | None = None) -> Any:
     rules = log.with_name("rules.toml")
     fields = "".join(f'[fields.{name}]\nchannel = "{channel}"\n' for name, channel in means)
     vehicle = card or log.with_suffix(".card.toml")
     rules.write_text(f'[[rules]]\nvehicle = "{vehicle}"\n{fields}')
-    made = scan.Scan(read_rules(rules), Method.PAPER)
-    (found,) = made.scan_files(Sources([str(log)]), lambda _: None)
-    assert isinstance(found, scan.Scanned)
-    assert found.recipe is not None
+    (found,) = scan_files(rules, [str(log)])
     content = hashlib.sha256(log.read_bytes()).hexdigest()
     assert found.file.content == content
     return Task("0123", str(log), content, found.recipe, str(log.with_suffix(".parquet")))

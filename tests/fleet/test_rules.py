@@ -12,10 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import RulesError
-from drivetwin.fleet import rules as rules_module
 from drivetwin.fleet.rules import parse_field_value, read_rules
-from drivetwin.fleet.sources import Source
-from tests.fleet.toys import ROOT
+from tests.fleet.toys import ROOT, scan_files
 
 DOCUMENTED = re.findall(
     r"^```toml\n(.*?)^```", (ROOT / "docs/howto/fleet.md").read_text("utf-8"), re.M | re.S
@@ -32,20 +30,26 @@ def rules_file(tmp_path: Path) -> Path:
     return path
 
 
-def _chosen(rules_file: Path, path: str, channels: frozenset[str] = frozenset()) -> str:
-    rules, source = read_rules(rules_file), Source(Path(path))
-    return rules_module.select_rule(rules, source, rules.get_unit(source), lambda: channels).name
-
-
-def test_the_first_rule_that_fits_decides(rules_file: Path) -> None:
-    known = frozenset({"EngTrq", "SpdIn"})
-    assert _chosen(rules_file, "/x/workshop/unit_07/a.csv") == "left out"
-    assert _chosen(rules_file, "/x/truck_a/unit_07/a.csv", known) == "truck A"
-    assert _chosen(rules_file, "/x/truck_a/unit_01/a.csv", known) == "all others"
-    assert _chosen(rules_file, "/x/truck_a/unit_07/a.csv") == "all others"
+def test_rules_give_each_log_its_card_unit_and_fields(rules_file: Path, tmp_path: Path) -> None:
+    """The first rule that fits decides."""
+    logs = tmp_path / "logs"
+    wanted = {
+        "workshop/unit_07/a.csv": ("left out", "07"),
+        "truck_a/unit_07/a_1234km.csv": ("truck A", "07"),
+        "truck_a/unit_01/a.csv": ("all others", "01"),
+    }
+    for number, name in enumerate(wanted):
+        path = logs / name
+        path.parent.mkdir(parents=True)
+        path.write_text(f"time,EngTrq,SpdIn\ns,Nm,rpm\n0,1,{number}\n1,2,{number}\n")
+    scanned = {str(one.file.path): one for one in scan_files(rules_file, [str(logs)])}
+    found = {name: scanned[str(logs / name)].file for name in wanted}
+    assert {name: (one.rule, one.unit) for name, one in found.items()} == wanted
+    assert found["truck_a/unit_07/a_1234km.csv"].fields["odometer_km"] == 1234.0
     rule = read_rules(rules_file).rules[1]
     assert rule.vehicle == str(rules_file.parent / "truck_a.toml")
     assert rule.channels == str(rules_file.parent / "channels.toml")
+    assert read_rules(rules_file).list_channel_means() == (("oil_temperature_degC", "TOil"),)
 
 
 def test_a_rule_without_a_name_is_one_of_its_own(rules_file: Path) -> None:
@@ -54,30 +58,15 @@ def test_a_rule_without_a_name_is_one_of_its_own(rules_file: Path) -> None:
     assert [rule.name for rule in read_rules(rules_file).rules] == ["rule 1", "trucks", "rule 3"]
 
 
-def test_fields_come_from_path_and_list_and_name_channels(rules_file: Path) -> None:
-    rules = read_rules(rules_file)
-    told = {"recorded": "2025-03-31", "other": "x"}
-    fields = rules.get_fields(Source(Path("/x/unit_1/a_1234km.csv"), told))
-    assert fields == {"odometer_km": 1234.0, "recorded_date": 1743379200.0}
-    assert rules.list_channel_means() == (("oil_temperature_degC", "TOil"),)
-    assert rules.get_fields(Source(Path("/x/unit_1/a.csv"))) == {}
-
-
-def test_the_unit_is_the_lists_else_the_patterns_else_the_folder(rules_file: Path) -> None:
-    rules = read_rules(rules_file)
-    assert rules.get_unit(Source(Path("/x/unit_12/a.csv"))) == "12"
-    assert rules.get_unit(Source(Path("/x/unit_12/a.csv"), {"unit": "T9"})) == "T9"
-    with pytest.raises(RulesError, match="unit's id"):
-        rules.get_unit(Source(Path("/x/y/a.csv")))
-    card = rules_file.with_name("card.toml")
-    card.write_text("gears = 1")
-    assert read_rules(card).get_unit(Source(Path("/x/y/a.csv"))) == "y"
-
-
-def test_no_rule_is_told(rules_file: Path) -> None:
+def test_a_log_without_unit_or_rule_is_told(rules_file: Path, tmp_path: Path) -> None:
+    log = tmp_path / "y" / "a.csv"
+    log.parent.mkdir()
+    log.write_text("time,x\ns,bar\n0,1\n")
+    (one,) = scan_files(rules_file, [str(log)])
+    assert "unit's id" in str(one.fault)
     rules_file.write_text('[[rules]]\npath = "*.mf4"\nvehicle = "truck_a.toml"\n')
-    with pytest.raises(RulesError, match="no rule takes this log of unit 'x'"):
-        _chosen(rules_file, "/x/a.csv")
+    (one,) = scan_files(rules_file, [str(log)])
+    assert "no rule takes this log of unit 'y'" in str(one.fault)
 
 
 @pytest.mark.parametrize(
@@ -132,16 +121,3 @@ def test_dates_are_seconds_since_1970(moment: datetime) -> None:
 def test_a_text_that_is_no_field_is_told(field: str, text: str) -> None:
     with pytest.raises(RulesError, match=text):
         parse_field_value(field, text)
-
-
-def test_readings_are_written_in_words() -> None:
-    """Dates as they were read, numbers with the name of their field."""
-    first, last = parse_field_value("date", "2024-02-29"), parse_field_value("date", "2025-02-28")
-    span = rules_module.format_span
-    assert span("recorded_date", first, last) == "2024-02-29 and 2025-02-28"
-    assert span("odometer_Mm", 119.2543, 123.0) == "119.3 and 123 odometer_Mm"
-    assert span("odometer_km", 98764.0, 123456.0) == "98760 and 123500 odometer_km"
-    factor, per = rules_module.get_drift_unit("recorded_date")
-    assert per == "year"
-    assert factor / (last - first) == pytest.approx(365.25 / 365.0)
-    assert rules_module.get_drift_unit("odometer_Mm") == (1.0, "odometer_Mm")

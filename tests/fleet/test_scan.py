@@ -8,10 +8,8 @@ from typing import Any
 
 import pytest
 
-from drivetwin import Method
 from drivetwin.fleet import scan
-from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.sources import Sources
+from tests.fleet.toys import scan_files
 
 RULE = '[[rules]]\nvehicle = "card.toml"\n'
 
@@ -27,8 +25,7 @@ def folder(tmp_path: Path) -> Path:
 
 def _scan(folder: Path, known: Any = None, rules: str = RULE, seconds: float = 60.0) -> list[Any]:
     (folder / "rules.toml").write_text(rules)
-    made = scan.Scan(read_rules(folder / "rules.toml"), Method.PAPER, seconds)
-    return list(made.scan_files(Sources([str(folder / "*.csv")]), (known or {}).get))
+    return scan_files(folder / "rules.toml", [str(folder / "*.csv")], known, seconds)
 
 
 def test_a_file_that_did_not_change_is_not_read_again(folder: Path) -> None:

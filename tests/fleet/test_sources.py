@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.fleet.sources import Source, Sources
+from drivetwin.fleet.sources import Sources
 
 
 @pytest.fixture
@@ -54,9 +54,9 @@ def test_a_name_that_stands_for_nothing_is_told(folder: Path) -> None:
 def test_a_list_names_files_and_what_belongs_to_them(folder: Path) -> None:
     listed = folder / "list.csv"
     listed.write_text("path,unit,odometer\nb/2.csv,T1,100\na/3.CSV,T2,\n")
-    assert list(Sources([], listed)) == [
-        Source(folder / "b/2.csv", {"unit": "T1", "odometer": "100"}),
-        Source(folder / "a/3.CSV", {"unit": "T2"}),
+    assert [(source.path, source.stated) for source in Sources([], listed)] == [
+        (folder / "b/2.csv", {"unit": "T1", "odometer": "100"}),
+        (folder / "a/3.CSV", {"unit": "T2"}),
     ]
     listed.write_text("b/2.csv\n\na/3.CSV\n")
     assert _names(Sources([], listed)) == ["2.csv", "3.CSV"]

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from drivetwin import Method
 from drivetwin._util.interrupts import interrupt_on_signals
-from drivetwin.fleet import index, parts, rows, task
+from drivetwin.fleet import index, parts, rows, scan, task
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.events import to_document
 from drivetwin.fleet.rules import read_rules
@@ -36,9 +36,15 @@ def make_logs(folder: Path, count: int, *, word: str = "", spoilt: Sequence[str]
     return folder
 
 
-def request(logs: Path, store: Path, **changes: Any) -> FleetRun:
-    """What `drivetwin fleet` would ask, with the toy at work."""
-    rules = read_rules(logs / "card.toml")
+def request(
+    logs: Path, store: Path, given: Sequence[str] = (), listed: Path | None = None, **changes: Any
+) -> FleetRun:
+    """Request of `drivetwin fleet` with the toy at work; all of `logs` unless `given` or `listed`.
+
+    `rules` names the rules by their file in the folder of the logs.
+    """
+    rules = read_rules(logs / changes.pop("rules", "card.toml"))
+    sources = Sources([*given] if given or listed else [str(logs)], listed)
     settings: dict[str, Any] = {
         "function": "tests.fleet.work:toy",
         "time_limit": 30.0,
@@ -47,13 +53,26 @@ def request(logs: Path, store: Path, **changes: Any) -> FleetRun:
         "method": Method.PAPER,
         **changes,
     }
-    return FleetRun(sources=Sources([str(logs)]), rules=rules, store=store, **settings)
+    return FleetRun(sources=sources, rules=rules, store=store, **settings)
 
 
-def run_toys(logs: Path, store: Path, **changes: Any) -> tuple[Any, list[Any]]:
+def run_toys(
+    logs: Path, store: Path, tell: Callable[[Any], None] | None = None, **changes: Any
+) -> tuple[Any, list[Any]]:
     """Run to the end; the summary and all events."""
     events: list[Any] = []
-    return run_fleet(request(logs, store, **changes), events.append), events
+    return run_fleet(request(logs, store, **changes), tell or events.append), events
+
+
+def scan_files(rules: Path, given: Sequence[str], known: Any = None, *limits: float) -> list[Any]:
+    """Scan files as a run does."""
+    made = scan.Scan(read_rules(rules), Method.PAPER, *limits)
+    return list(made.scan_files(Sources([*given]), (known or {}).get))
+
+
+def open_store(folder: Path) -> Any:
+    """Open a store to be filled."""
+    return Store(folder, write=True)
 
 
 def contents(store: Path) -> dict[str, Any]:

@@ -12,13 +12,14 @@ import os
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 from drivetwin.errors import FileFormatError
 from drivetwin.fleet.rows import Found, Row, RowKind
-from drivetwin.fleet.task import ShiftRow, Task
+from drivetwin.fleet.task import ShiftRow
 
 
-def toy(task: Task) -> Found:
+def toy(task: Any) -> Found:
     """Rows and a shift that follow from the file's content alone."""
     words = Path(task.path).read_text().split()
     if "print" in words:

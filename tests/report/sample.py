@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from drivetwin.channels.roles import Quantity
@@ -12,6 +14,7 @@ from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdic
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import compute_fit
 from drivetwin.findings import Code, report
+from drivetwin.report.html import build_report_sections
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
@@ -221,6 +224,17 @@ def identification() -> Identification:
     )
 
 
-def simulated() -> Identification:
-    """The identification with the fit of its simulation."""
-    return attach_fit(identification(), [validation()])
+def simulated(*runs: Validation) -> Identification:
+    """The identification with the fit of its simulations."""
+    return attach_fit(identification(), list(runs) or [validation()])
+
+
+def build_section(found: Identification, anchor: str) -> Any:
+    """Build a section of the page."""
+    (section,) = (one for one in build_report_sections(found, log()) if one.anchor == anchor)
+    return section
+
+
+def list_blocks(found: Identification, anchor: str, kind: str) -> list[Any]:
+    """List the blocks of a kind, as `table` and `figure`, in a section of the page."""
+    return [one for one in build_section(found, anchor).blocks if one.kind == kind]

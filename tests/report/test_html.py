@@ -13,17 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.estimation.identification import Identification, StageResults
+from drivetwin.estimation.identification import Identification
 from drivetwin.findings import render
-from drivetwin.report.blocks import FigureBlock, Section
-from drivetwin.report.html import build_report_sections, render_report, save_report
-from drivetwin.validation.simulate_log import attach_fit
-from tests.report.sample import identification, log, validation
+from drivetwin.report.html import render_report, save_report
+from tests.report.sample import build_section, list_blocks, log, simulated
 
 
 @pytest.fixture(scope="module")
 def found() -> Identification:
-    return attach_fit(identification(), [validation()])
+    return simulated()
 
 
 @pytest.fixture(scope="module")
@@ -53,12 +51,6 @@ def test_the_page_opens_with_the_verdict(page: str, found: Identification) -> No
     assert "10 of 12 parameters are identified, 1 weak, 1 not ident" in markup
 
 
-def test_sections_of_other_methods_are_closed(page: str, found: Identification) -> None:
-    sections = build_report_sections(found, log())
-    closed = [section.anchor for section in sections if section.collapsed]
-    assert re.findall(r'<details id="([^"]*)">', page) == closed
-
-
 def test_every_parameter_and_reason_is_shown(page: str, found: Identification) -> None:
     markup = _without_scripts(page)
     for estimate in found.estimates.values():
@@ -74,7 +66,10 @@ def test_names_from_files_are_escaped(page: str) -> None:
 
 
 def test_figures_are_json_with_units_on_their_axes(page: str) -> None:
-    figures = [json.loads(text) for text in re.findall(r'application/json">(.*?)</script>', page)]
+    figures = [
+        json.loads(text, parse_constant=pytest.fail)
+        for text in re.findall(r'application/json">(.*?)</script>', page)
+    ]
     assert len(figures) == 7
     titles = [
         axis["title"]["text"]
@@ -88,12 +83,11 @@ def test_figures_are_json_with_units_on_their_axes(page: str) -> None:
 
 def test_plotly_knows_every_entry_of_the_figures(found: Identification) -> None:
     """The Python library refuses a wrong entry that plotly.js ignores."""
-    blocks = [one for section in build_report_sections(found, log()) for one in section.blocks]
-    figures = [one.figure for one in blocks if isinstance(one, FigureBlock)]
-    for figure in figures:
-        drawn = figure.to_plotly()
-        assert len(drawn.data) == len(figure.data)
-        assert drawn.layout.height == figure.layout.height
+    for section in ("result", "shift", "friction", "validation"):
+        for block in list_blocks(found, section, "figure"):
+            drawn = block.figure.to_plotly()
+            assert len(drawn.data) == len(block.figure.data)
+            assert drawn.layout.height == block.figure.layout.height
 
 
 def test_equal_inputs_give_equal_text(page: str, found: Identification) -> None:
@@ -108,31 +102,23 @@ def test_stays_small_for_long_logs(found: Identification, tmp_path: Path) -> Non
 
 def test_sparse_identification_leaves_sections_out(found: Identification) -> None:
     sparse = replace(
-        found,
-        estimates={},
-        friction={},
-        fit={},
-        evidence=StageResults(),
-        correlation=None,
-        findings=(),
-    )
-    titles = [section.anchor for section in build_report_sections(sparse, log())]
-    assert "friction" not in titles
-    assert "validation" not in titles
-    assert render_report(sparse, log()).startswith("<!DOCTYPE html>")
+        found, estimates={}, friction={}, fit={}, correlation=None, findings=(),
+        evidence=replace(found.evidence, validation=()),
+    )  # fmt: skip
+    page = render_report(sparse, log())
+    assert page.startswith("<!DOCTYPE html>")
+    assert 'id="friction"' not in page
+    assert 'id="validation"' not in page
 
 
 def test_several_shifts_are_shown_in_the_whole_log_first(found: Identification) -> None:
     twice = replace(found, shifts=found.shifts * 2)
-    (whole, *_) = find_shift_section(twice).blocks
-    assert isinstance(whole, FigureBlock)
+    (whole, *_) = list_blocks(twice, "shift", "figure")
     assert len(whole.figure.layout.shapes) == 4
-    assert len(find_shift_section(found).blocks) < len(find_shift_section(twice).blocks)
-
-
-def find_shift_section(found: Identification) -> Section:
-    (section,) = (one for one in build_report_sections(found, log()) if one.anchor == "shift")
-    return section
+    labels = [button.label for button in whole.figure.layout.updatemenus[0].buttons]
+    assert labels == ["whole", "2→3, 1.6 s", "2→3, 1.6 s"]
+    once, both = (len(build_section(one, "shift").blocks) for one in (found, twice))
+    assert once < both
 
 
 def _without_scripts(page: str) -> str:

@@ -6,52 +6,38 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
-from drivetwin.estimation.identification import Identification, StageResults
-from drivetwin.report.notebook import draw_figure, summarise
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import attach_fit
-from tests.report.sample import card, identification, log, validation
-
-
-def found() -> Identification:
-    return attach_fit(identification(), [validation()])
+from tests.report.sample import card, log, simulated, validation
 
 
 def test_a_summary_fits_a_terminal_and_names_every_parameter() -> None:
-    text = str(found().summary())
+    text = str(simulated().summary())
     assert max(len(line) for line in text.splitlines()) <= 80
-    assert all(name in text.split() for name in found().estimates)
+    assert all(name in text.split() for name in simulated().estimates)
     assert "τ_e: the engine torque is constant; record throttle steps" in text
     assert "Warnings\n  Engine torque varies by only 1.0 %" in text
-    assert repr(found().summary()) == text
+    assert repr(simulated().summary()) == text
 
 
 def test_numbers_stand_in_display_units_with_their_interval() -> None:
-    lines = [line.split() for line in str(found().summary()).splitlines()]
+    lines = [line.split() for line in str(simulated().summary()).splitlines()]
     assert ["Fill", "pressure", "P0", "(B3)", "0.820", "0.043", "bar", "identified"] in lines
     delay = next(line for line in lines if line[:3] == ["Engine", "torque", "delay"])
     assert delay[3:] == ["τ_e", "–", "–", "ms", "not", "identifiable", "(2)"]
 
 
 def test_the_rich_representation_escapes_names() -> None:
-    html = found()._repr_html_()
+    html = simulated()._repr_html_()
     assert "sample &lt;1&gt;.csv" in html
     assert "<1>" not in html
     assert html.count("<table") == 4
 
 
-def test_an_identification_without_simulation_shows_its_intervals() -> None:
-    bare = replace(identification(), evidence=StageResults())
-    assert "95 % interval" in bare.plot().layout.xaxis.title.text
-    assert "Simulation against" not in str(bare.summary())
-
-
 def test_a_twin_shows_its_friction() -> None:
-    twin = build_twin(found(), card())
+    twin = build_twin(simulated(), card())
     assert [trace.name for trace in twin.plot().data if trace.name] == ["B3"]
     assert "Twin of sample truck" in str(twin.summary())
 
@@ -83,10 +69,3 @@ def test_channels_of_any_quantity_are_shown() -> None:
 def test_a_validation_is_the_figure_of_the_report() -> None:
     assert "simulated" in {trace.name for trace in validation().plot().data}
     assert "simulated: completed" in str(validation().summary())
-
-
-def test_other_things_have_neither() -> None:
-    with pytest.raises(TypeError, match="no figure of a dict"):
-        draw_figure({})
-    with pytest.raises(TypeError, match="no summary of a dict"):
-        summarise({})

@@ -12,13 +12,10 @@ from typing import Any
 import pytest
 from flask.testing import FlaskClient
 
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.cli import main
 from drivetwin.estimation.result.method import Method
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import build_server
-from drivetwin.workbench.session import Session
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace_folder import Folder
@@ -30,12 +27,13 @@ LOG, CARD = "bench.csv", "bench.card.toml"
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with `bench.csv` and its card."""
     folder = tmp_path_factory.mktemp("workbench")
-    write_run(folder / LOG, run(load_scenario("paper_steps"), seed=1))
+    arguments = ["--scenario", "paper_steps", "--seed", "1"]
+    assert main(["synth", "-o", str(folder / LOG), *arguments]) == 0
     return folder
 
 
 @pytest.fixture
-def session(place: Path) -> Iterator[Session]:
+def session(place: Path) -> Iterator[Any]:
     """A session in which nothing is open."""
     sessions = Sessions(Folder.from_path(place))
     yield sessions.get(sessions.create())
@@ -43,7 +41,7 @@ def session(place: Path) -> Iterator[Session]:
 
 
 @pytest.fixture(scope="session")
-def identified(place: Path) -> Iterator[Session]:
+def identified(place: Path) -> Iterator[Any]:
     """A session that has identified the log by the paper's and the linear method."""
     sessions = Sessions(Folder.from_path(place))
     one = sessions.get(sessions.create())
@@ -69,7 +67,7 @@ def serve() -> Iterator[Callable[..., Any]]:
         sessions.close()
 
 
-def finish(session: Session) -> None:
+def finish(session: Any) -> None:
     """Wait for the job of a session."""
     while session.job is not None:
         session.collect_job_results()

@@ -48,15 +48,6 @@ def _list_keys(form: Any) -> list[Any]:
     return [one.question.key for one in form.entries]
 
 
-def test_answers_open_the_questions_that_follow_from_them(begun: Any) -> None:
-    form = begun.form
-    assert ("elements", "B2", "gain_m3") not in _list_keys(form)
-    form.fill_in({("elements", "B2", "form"): "gain"})
-    assert ("elements", "B2", "gain_m3") in _list_keys(form)
-    form.fill_in({("elements", "B2", "form"): "diameters"})
-    assert ("elements", "B2", "outer_mm") in _list_keys(form)
-
-
 def test_a_refused_answer_has_its_reason_beside_the_field(begun: Any) -> None:
     form = begun.form
     form.fill_in({("final_drive",): "4,88", ("gears", "names"): "2"})
@@ -95,11 +86,6 @@ def test_open_answers_are_listed_and_nothing_is_written(begun: Any) -> None:
     with pytest.raises(InputError, match="Is the gain of B2 known"):
         begun.write_card("truck.toml", {}, can_replace=False)
     assert not list(begun.folder.root.glob("*.toml"))
-
-
-def test_a_card_needs_to_be_begun(session: Any) -> None:
-    with pytest.raises(InputError, match="no card is begun"):
-        session.write_card("truck", ANSWERS, can_replace=False)
 
 
 TEXTS = st.text(max_size=12) | st.sampled_from(

@@ -5,39 +5,37 @@ from __future__ import annotations
 
 import os
 import time
+from typing import Any
 
 import pytest
 
-from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin.errors import InputError, UnitError, Where
-from drivetwin.workbench.jobs import Emit, Fault, call, start
+from drivetwin.workbench.jobs import call, start
 
 
-def _two(emit: Emit, first: int) -> None:
+def _two(emit: Any, first: int) -> None:
     emit(first)
-    with scale_progress(0.0, 1.0, "counting"):
-        notify_progress(0.5)
     emit(first + 1)
 
 
-def _faulty(_: Emit) -> None:
+def _faulty(_: Any) -> None:
     raise UnitError("unknown unit 'x'", "use bar", Where(channel="p"))
 
 
-def _sleeping(emit: Emit) -> None:
+def _sleeping(emit: Any) -> None:
     emit(os.getpid())
     time.sleep(60.0)
 
 
-def _dying(_: Emit) -> None:
+def _dying(_: Any) -> None:
     os._exit(3)
 
 
-def _greedy(_: Emit) -> None:
+def _greedy(_: Any) -> None:
     raise MemoryError
 
 
-def _broken(_: Emit) -> None:
+def _broken(_: Any) -> None:
     raise ValueError("odd")
 
 
@@ -52,14 +50,6 @@ def _alive(pid: int) -> bool:
 def test_results_come_in_order_and_the_last_is_the_answer() -> None:
     assert start(_two, 3).collect_results(30.0) == [3, 4]
     assert call(_two, 1, limit=30.0) == 2
-
-
-def test_progress_is_told() -> None:
-    job = start(_two, 3)
-    while not job.finished:
-        job.get_results()
-        time.sleep(0.01)
-    assert job.text == "counting"
 
 
 def test_a_typed_error_keeps_its_parts() -> None:
@@ -97,7 +87,3 @@ def test_what_takes_too_long_is_stopped() -> None:
     with pytest.raises(InputError, match="longer than"):
         job.collect_results(1.5)
     assert job.finished
-
-
-def test_a_fault_is_an_error_with_its_place() -> None:
-    assert "channel 'p'" in str(Fault("a", "b", Where(channel="p")).to_error())

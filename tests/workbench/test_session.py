@@ -7,6 +7,7 @@ import shutil
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,18 +16,17 @@ from drivetwin.errors import InputError, UnitError
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.mapping import Entry, list_rows
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from tests.workbench.conftest import CARD, LOG, finish
 
 SECOND = "second.csv"
 
 
-def _open(session: Session) -> None:
+def _open(session: Any) -> None:
     session.open(session.get_folder_source(LOG), session.get_folder_source(CARD))
 
 
-def test_locks_and_phases_reach_the_identification(session: Session) -> None:
+def test_locks_and_phases_reach_the_identification(session: Any) -> None:
     _open(session)
     shift = session.work.require_shift()
     time = shift.torque_phase[0] - 0.004
@@ -42,7 +42,7 @@ def test_locks_and_phases_reach_the_identification(session: Session) -> None:
     assert outcome.found.shifts[0].torque_phase[0] == time
 
 
-def test_why_an_identification_ended_early_is_kept_until_the_next(session: Session) -> None:
+def test_why_an_identification_ended_early_is_kept_until_the_next(session: Any) -> None:
     _open(session)
     session.identify([Method.INTEGRAL])
     assert session.job is not None
@@ -55,16 +55,8 @@ def test_why_an_identification_ended_early_is_kept_until_the_next(session: Sessi
     session.cancel()
 
 
-def test_a_log_is_given_up_after_the_time_for_its_size(
-    session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("drivetwin.logs.formats.guarded.TIME_PER_BYTE", -1.0)
-    with pytest.raises(InputError, match="was stopped"):
-        _open(session)
-
-
 def test_units_that_a_table_does_not_name_are_proposed_and_stated(
-    session: Session, place: Path
+    session: Any, place: Path
 ) -> None:
     """First the unit of time, then those of the channels: a table as MATLAB writes it."""
     names, _, *rows = (place / LOG).read_text(encoding="utf-8").splitlines()
@@ -93,14 +85,14 @@ def test_units_that_a_table_does_not_name_are_proposed_and_stated(
     assert len(session.work.shifts) == 1
 
 
-def _list_entries(session: Session) -> list[Entry]:
+def _list_entries(session: Any) -> list[Any]:
     rows = list_rows(session.work.require_opened().survey)
     return [Entry(one.role, one.unit, one.reversed) for one in rows]
 
 
 @pytest.mark.parametrize("with_card", [True, False])
 def test_a_recognised_column_can_be_not_used_and_used_again(
-    session: Session, *, with_card: bool
+    session: Any, *, with_card: bool
 ) -> None:
     session.open(
         session.get_folder_source(LOG), session.get_folder_source(CARD) if with_card else None
@@ -121,18 +113,7 @@ def test_a_recognised_column_can_be_not_used_and_used_again(
     assert unused <= set(session.work.require_log().channels)
 
 
-def test_sliders_of_a_session_and_back(identified: Session) -> None:
-    before = identified.get_simulation().present.fit
-    curves = identified.apply_sliders({"k_o": 1.2e5})
-    assert curves
-    assert identified.work.changes == {"k_o": 1.2e5}
-    assert identified.get_simulation().present.fit != before
-    identified.choose_method(Method.INTEGRAL)
-    assert identified.work.changes == {}
-    assert identified.get_simulation().present.fit == before
-
-
-def test_what_cannot_be_read_lets_the_identification_run_on(session: Session) -> None:
+def test_what_cannot_be_read_lets_the_identification_run_on(session: Any) -> None:
     _open(session)
     session.identify([Method.PAPER])
     with pytest.raises(InputError):
@@ -150,7 +131,7 @@ def test_what_cannot_be_read_lets_the_identification_run_on(session: Session) ->
     assert session.job is None
 
 
-def test_nothing_is_done_before_a_log_is_open(session: Session) -> None:
+def test_nothing_is_done_before_a_log_is_open(session: Any) -> None:
     for action in (
         lambda: session.identify([Method.PAPER]),
         lambda: session.correct_mapping([]),
@@ -162,7 +143,7 @@ def test_nothing_is_done_before_a_log_is_open(session: Session) -> None:
             action()
 
 
-def test_uploads_that_are_open_stay_however_many_come_after(session: Session, place: Path) -> None:
+def test_uploads_that_are_open_stay_however_many_come_after(session: Any, place: Path) -> None:
     keys = []
     for name in (LOG, CARD):
         with (place / name).open("rb") as stream:
@@ -178,30 +159,7 @@ def test_uploads_that_are_open_stay_however_many_come_after(session: Session, pl
     assert keys[0] not in session.uploads
 
 
-def test_a_log_without_a_card_has_its_pressures_by_label(session: Session) -> None:
-    session.open(session.get_folder_source(LOG))
-    work = session.work
-    assert {"pressure.B2", "pressure.B3"} <= set(work.require_log().channels)
-    assert not work.shifts
-    with pytest.raises(InputError, match="no vehicle card"):
-        session.identify([Method.PAPER])
-
-
-def test_corrections_of_elements_that_a_card_lacks_are_left_out(session: Session) -> None:
-    session.open(session.get_folder_source(LOG))
-    rows = list_rows(session.work.require_opened().survey)
-    session.correct_mapping([Entry(one.role, one.unit, one.reversed) for one in rows])
-    text = session.get_folder_source(CARD).path.read_text().replace("B2", "X2")
-    other = session.scratch / "other.toml"
-    other.write_text(text)
-    session.open_card(Source("other.toml", other))
-    opened = session.work.require_opened()
-    assert opened.card is not None
-    assert "pressure.B2" not in opened.survey.mapping
-    assert "is no element" not in opened.fault
-
-
-def test_any_column_can_be_previewed(session: Session) -> None:
+def test_any_column_can_be_previewed(session: Any) -> None:
     session.open(session.get_folder_source(LOG))
     survey = session.work.require_opened().survey
     for index, column in enumerate(survey.columns):
@@ -213,7 +171,7 @@ def test_any_column_can_be_previewed(session: Session) -> None:
         session.read_column(len(survey.columns))
 
 
-def test_the_mapping_of_the_project_folder_is_used(session: Session, tmp_path: Path) -> None:
+def test_the_mapping_of_the_project_folder_is_used(session: Any, tmp_path: Path) -> None:
     source = session.get_folder_source(LOG)
     log = tmp_path / LOG
     log.write_bytes(source.path.read_bytes())
@@ -230,24 +188,8 @@ def test_the_mapping_of_the_project_folder_is_used(session: Session, tmp_path: P
     assert session.work.require_log()["output_torque"].time == pytest.approx(shifted)
 
 
-def test_a_mapping_that_fits_no_column_is_reported_and_not_applied(
-    session: Session, tmp_path: Path
-) -> None:
-    source = session.get_folder_source(LOG)
-    log = tmp_path / LOG
-    log.write_bytes(source.path.read_bytes())
-    (tmp_path / "channels.toml").write_text('[channels.output_torque]\nsource = "of another log"\n')
-    session.open(Source(LOG, log))
-    opened = session.work.require_opened()
-    assert not opened.fault
-    found = session.work.require_log()
-    (finding,) = [one for one in found.findings if "channels.toml" in one.text]
-    assert "of another log" in finding.text
-    assert "output_torque" in found.channels
-
-
 @pytest.fixture
-def several(session: Session, place: Path) -> Session:
+def several(session: Any, place: Path) -> Any:
     """A session with two logs of one vehicle, the first selected."""
     shutil.copyfile(place / LOG, place / SECOND)
     _open(session)
@@ -259,7 +201,7 @@ def several(session: Session, place: Path) -> Session:
     return session
 
 
-def test_a_held_out_log_is_predicted_and_has_no_twin(several: Session) -> None:
+def test_a_held_out_log_is_predicted_and_has_no_twin(several: Any) -> None:
     several.identify([Method.PAPER])
     finish(several)
     assert "one log at a time" in several.work.refusals[Method.PAPER]
@@ -278,7 +220,7 @@ def test_a_held_out_log_is_predicted_and_has_no_twin(several: Session) -> None:
     assert several.get_simulation().present.fit
 
 
-def test_several_logs_are_corrected_saved_removed_and_limited(several: Session) -> None:
+def test_several_logs_are_corrected_saved_removed_and_limited(several: Any) -> None:
     first, second = several.work.logs
     assert first.corrections == second.corrections
     assert second.corrections.channels["wheel_speed"].unit == "1/min"

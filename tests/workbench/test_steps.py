@@ -31,22 +31,6 @@ def test_log_and_card_lead_to_the_identification(session: Any) -> None:
     assert _assess(session.work)[1] == [*["DONE"] * 4, "NEXT", "BLOCKED", "BLOCKED"]
 
 
-def test_every_log_must_be_readable_and_one_shift_fitted(identified: Any) -> None:
-    work = identified.work
-    one = work.require_open_log()
-    shifts = _assess(work.set_log(replace(one, shifts=())))[0]["shifts"]
-    assert (shifts.status.name, shifts.has_content) == ("BLOCKED", True)
-    opened = replace(one.opened, log=None, found=None, fault="no unit")
-    broken = replace(one, source=replace(one.source, name="b.csv"), opened=opened, shifts=())
-    states, statuses = _assess(replace(work, logs=(one, broken)).drop_results())
-    assert statuses == ["DONE", "NEXT", "DONE", *["BLOCKED"] * 4]
-    assert states["channels"].text == "b.csv cannot be read as mapped."
-    assert states["shifts"].remedy is states["identify"].remedy is states["channels"].step
-    states, _ = _assess(work.drop_results().hold_out([frozenset({0})]))
-    assert states["shifts"].text == "2→3 found, 1 held out."
-    assert states["identify"].text == "Every shift is held out."
-
-
 def test_only_the_default_method_completes_the_identification(identified: Any) -> None:
     work, outcome = identified.work, identified.work.require_outcome()
     assert _assess(work)[0]["identify"].status.name == "NEXT"

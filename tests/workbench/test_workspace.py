@@ -17,14 +17,11 @@ from drivetwin import Method
 from drivetwin.errors import RefusedError
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.phases import Boundary
-from drivetwin.workbench.session import Session
-from drivetwin.workbench.sessions import Sessions
-from drivetwin.workbench.workspace_folder import Folder
 from tests.workbench.conftest import CARD, LOG
 
 
 @pytest.fixture(scope="module")
-def saved(identified: Session) -> Iterator[Path]:
+def saved(identified: Any) -> Iterator[Path]:
     """A workspace with a moved boundary, a lock and a slider."""
     time = identified.work.shifts[0].inertia_phase[0] + 0.003
     identified.move_boundaries(0, {Boundary.INERTIA: time})
@@ -38,7 +35,7 @@ def saved(identified: Session) -> Iterator[Path]:
 
 
 def test_a_reopened_workspace_goes_on_where_it_was(
-    identified: Session, session: Session, saved: Path
+    identified: Any, session: Any, saved: Path
 ) -> None:
     session.reopen(session.get_folder_source(saved.name))
     before, after = identified.work, session.work
@@ -54,7 +51,7 @@ def test_a_reopened_workspace_goes_on_where_it_was(
     assert fits[0].fit_percent == pytest.approx(fits[1].fit_percent, rel=1e-6)
 
 
-def test_saving_again_replaces_it_and_no_other_file(identified: Session, saved: Path) -> None:
+def test_saving_again_replaces_it_and_no_other_file(identified: Any, saved: Path) -> None:
     assert identified.save(saved.name) == saved.name
     (saved.parent / "notes.workspace.json").write_text("{}")
     with pytest.raises(RefusedError, match="no workspace"):
@@ -86,7 +83,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], object]:
     ],
 )
 def test_a_damaged_key_is_named(
-    session: Session, saved: Path, damage: Callable[[dict[str, Any]], object], says: str
+    session: Any, saved: Path, damage: Callable[[dict[str, Any]], object], says: str
 ) -> None:
     content = json.loads(saved.read_text())
     damage(content)
@@ -105,14 +102,14 @@ class _Runs:
     "content",
     [b"", b"{", b"[]", b"\x00\xff", pickle.dumps(_Runs()), b"[" * 100_000, b'{"version": 1e999}'],
 )
-def test_what_is_no_workspace_is_refused(session: Session, saved: Path, content: bytes) -> None:
+def test_what_is_no_workspace_is_refused(session: Any, saved: Path, content: bytes) -> None:
     saved.with_name("none.workspace.json").write_bytes(content)
     with pytest.raises(RefusedError):
         session.reopen(session.get_folder_source("none.workspace.json"))
 
 
 @pytest.mark.parametrize("path", ["../bench.csv", "/etc/passwd", "absent.csv"])
-def test_a_workspace_cannot_name_files_outside(session: Session, saved: Path, path: str) -> None:
+def test_a_workspace_cannot_name_files_outside(session: Any, saved: Path, path: str) -> None:
     content = json.loads(saved.read_text())
     content["logs"][0]["file"]["path"] = path
     crafted = saved.with_name("crafted.workspace.json")
@@ -122,7 +119,7 @@ def test_a_workspace_cannot_name_files_outside(session: Session, saved: Path, pa
     assert session.work.opened is None
 
 
-def test_a_changed_log_is_told(session: Session, saved: Path) -> None:
+def test_a_changed_log_is_told(session: Any, saved: Path) -> None:
     content = json.loads(saved.read_text())
     content["logs"][0]["file"]["sha256"] = "0" * 64
     crafted = saved.with_name("changed.workspace.json")
@@ -132,20 +129,19 @@ def test_a_changed_log_is_told(session: Session, saved: Path) -> None:
 
 
 @pytest.fixture
-def uploaded(place: Path, tmp_path: Path) -> Iterator[Session]:
+def uploaded(place: Path, tmp_path: Path, serve: Callable[..., Any]) -> Any:
     """A session in an empty folder, with log and card uploaded and open."""
-    sessions = Sessions(Folder.from_path(tmp_path))
+    _, sessions = serve(tmp_path)
     one = sessions.get(sessions.create())
     keys = []
     for name in (LOG, CARD):
         with (place / name).open("rb") as stream:
             keys.append(one.store_upload(stream, name, None, 10**8))
     one.open(one.get_uploaded(keys[0]), one.get_uploaded(keys[1]))
-    yield one
-    sessions.close()
+    return one
 
 
-def test_uploads_are_kept_beside_the_workspace(uploaded: Session, session: Session) -> None:
+def test_uploads_are_kept_beside_the_workspace(uploaded: Any, session: Any) -> None:
     folder = uploaded.folder.root
     name = uploaded.save("kept")
     session.folder = uploaded.folder
@@ -157,7 +153,7 @@ def test_uploads_are_kept_beside_the_workspace(uploaded: Session, session: Sessi
 
 
 def test_an_upload_that_cannot_be_kept_leaves_nothing(
-    uploaded: Session, monkeypatch: pytest.MonkeyPatch
+    uploaded: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(path: Path, _: Path) -> None:
         raise OSError(errno.EIO, os.strerror(errno.EIO), str(path))

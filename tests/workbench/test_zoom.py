@@ -3,16 +3,11 @@
 
 from __future__ import annotations
 
-import base64
 from typing import Any
 
-import numpy as np
 import pytest
 
-from drivetwin._util.display_units import NM
-from drivetwin.report.figures.stack import Curve, Panel
-from drivetwin.workbench.zoom import collect_curves, parse_view
-from tests.support.arrays import FloatArray
+from drivetwin.workbench.zoom import parse_view
 
 
 @pytest.mark.parametrize(
@@ -32,19 +27,6 @@ from tests.support.arrays import FloatArray
 )
 def test_the_window_of_an_event(change: dict[str, Any], view: tuple[float, float] | None) -> None:
     assert parse_view(change) == view
-
-
-@pytest.mark.parametrize("start", [0.0, 90_000.0])
-def test_every_sample_in_view_is_sent(start: float) -> None:
-    time: FloatArray = start + np.arange(600_000, dtype=np.float64) * 1e-3
-    curve = Curve("T", time, np.sin(time).astype(np.float64), "#000")
-    view = (start + 300.0, start + 301.0)
-    (sent,) = collect_curves([Panel("torque", NM, [curve])], view).values()
-    x = np.frombuffer(base64.b64decode(sent["x"]["bdata"]), sent["x"]["dtype"])
-    assert x.size < 10_000
-    inside = x[(x >= view[0]) & (x <= view[1])]
-    assert inside.size == pytest.approx(1001, abs=1)
-    assert np.diff(inside) == pytest.approx(1e-3, abs=1e-4)
 
 
 def test_the_only_shift_in_the_window_is_selected(identified: Any) -> None:

@@ -3,17 +3,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from drivetwin.fleet.mixed_model.change_points import find_steps
-from drivetwin.fleet.mixed_model.mixed import IntArray
 from tests.support.arrays import FloatArray
 
 UNITS, LOGS = 20, 40
 
 
-def _fleet(seed: int) -> tuple[IntArray, FloatArray, FloatArray]:
+def _fleet(seed: int) -> tuple[Any, FloatArray, FloatArray]:
     """Units, readings and values: each unit its own level and drift, noise of 1."""
     draws = np.random.default_rng(seed)
     unit = np.repeat(np.arange(UNITS), LOGS)

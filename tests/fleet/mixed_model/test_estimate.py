@@ -14,8 +14,7 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet
-from drivetwin.fleet.store import Store
-from tests.fleet.toys import fill
+from tests.fleet.toys import fill, open_store
 
 UNITS, LOGS = 15, 30
 DRIFT = -4e-5
@@ -41,12 +40,12 @@ def _rows(mu: float, log: str, draws: np.random.Generator) -> list[tuple[Any, ..
 
 
 @pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A fleet in which one unit changed at 120, one is odd from the start, and one log is stray."""
     draws = np.random.default_rng(0)
     level = 0.118 + 2e-3 * draws.standard_normal(UNITS)
     level[4] += 0.05
-    with Store(tmp_path_factory.mktemp("fleet"), write=True) as opened:
+    with open_store(tmp_path_factory.mktemp("fleet")) as opened:
         for number in range(UNITS * LOGS):
             log, unit = f"{number:08d}", number % UNITS
             reading = 200.0 * draws.random()
@@ -60,7 +59,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
 
 
 @pytest.fixture(scope="module")
-def found(store: Store) -> dict[str, Any]:
+def found(store: Any) -> dict[str, Any]:
     """All joint estimates, by parameter."""
     return {one.parameter: one for one in estimate_fleet(store)}
 
@@ -107,7 +106,7 @@ def test_a_unit_beyond_the_others_is_odd(found: dict[str, Any]) -> None:
 
 
 def test_an_odd_unit_is_told_by_the_command(
-    store: Store, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    store: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["fleet", "estimate", str(store.folder), "--parameter", "mu.B3"]) == 0
     told = " ".join(capsys.readouterr().out.split())
@@ -130,7 +129,7 @@ def test_a_stray_log_is_named_with_the_reason(found: dict[str, Any]) -> None:
 
 
 def test_too_few_logs_give_no_estimate(tmp_path: Path) -> None:
-    with Store(tmp_path, write=True) as opened:
+    with open_store(tmp_path) as opened:
         for log in ("00", "01"):
             fill(opened, log, [_value_row("eta", 0.8, 0.1)], unit="u", rule="r")
         assert estimate_fleet(opened) == []

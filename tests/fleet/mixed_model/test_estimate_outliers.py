@@ -6,13 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.fleet.mixed_model.estimate import (
-    FALSE_ALARMS,
-    compute_unit_limit,
-    compute_unit_scores,
-)
+from drivetwin.fleet.mixed_model.estimate import compute_unit_limit, compute_unit_scores
 
 FLEETS = 4000
+FALSE_ALARMS = 0.05
+"""Share of fleets without an odd unit in which one is named, as the page states."""
 
 
 @pytest.mark.parametrize("count", [5, 8, 11, 12, 20, 50])
