@@ -14,7 +14,7 @@ from drivetwin.export.c.loaded import CModel
 from drivetwin.export.fmu.build import BuildOptions, build_fmu
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.input_delays import InputDelays
-from drivetwin.export.subject import Subject, build_note
+from drivetwin.export.subject import Subject
 from drivetwin.export.targets import FmiVersion, InputKind
 from tests.export.cases import (
     CASES,
@@ -23,30 +23,15 @@ from tests.export.cases import (
     Case,
     run_core,
     write_model,
-    write_source,
 )
 from tests.export.fmu.test_build import Instance
 from tests.export.modelica.compiled import run as run_modelica
-from tests.export.parameters.sample import twin
 from tests.support.arrays import FloatArray
 
 OLD_TORQUE = InputDelays(0.0213, 0.0, as_logged=True, held=0.01)
 EARLY_PRESSURE = InputDelays(0.004, -0.0092, as_logged=True)
 LATE_PRESSURE = InputDelays(-0.003, 0.0452, as_logged=True)
 ALL = (OLD_TORQUE, EARLY_PRESSURE, LATE_PRESSURE)
-
-
-def test_every_form_describes_the_delays_inside() -> None:
-    delays = OLD_TORQUE
-    subject = replace(CASES["tie_up"]().subject, delays=delays, note=build_note(twin(), delays))
-    source, model = write_source(subject), write_model(subject)
-    for text in (source, model):
-        assert "outputs 0.0263 s later than the motion" in text
-        assert "advance the logged signal" not in text
-    assert ".pressure = DT_C(0.0263)" in source
-    assert "delay(u_B3, 0.0263)" in model
-    assert "delay(u_engine_torque" not in model
-    assert "delay(" not in write_model(replace(subject, delays=InputDelays(0.0213)))
 
 
 def _swing(name: str) -> Case:

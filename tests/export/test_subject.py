@@ -51,18 +51,6 @@ def test_modelica_holds_the_parts_and_c_names_them_as_left_out() -> None:
     assert reduced == vars(replace(build_subject(plain), note=""))
 
 
-def test_the_error_of_the_reduced_form_is_that_of_its_run() -> None:
-    """The torque goes through zero: with play it is late by the time that the gap takes."""
-    plain = twin()
-    play = replace(plain.parameters["eta"], id="backlash", value=0.02)
-    subject = build_subject(replace(plain, parameters={**plain.parameters, "backlash": play}))
-    time = np.linspace(0.0, 1.0, 1001)
-    torque = np.interp(time, [0.0, 0.3, 0.4, 1.0], [600.0, 600.0, -2500.0, -2500.0])
-    inputs = np.column_stack([torque, np.full(1001, 14e5), np.zeros(1001)])
-    assert 0.02 < subject.compute_reduction_error(time, inputs) < 1.0
-    assert subject.reduce().compute_reduction_error(time, inputs) == 0.0
-
-
 def test_a_steady_start_is_steady() -> None:
     """With the engine torque that carries the load nothing accelerates."""
     model = paper_model()

@@ -116,7 +116,7 @@ def test_several_shifts_are_shown_in_the_whole_log_first(found: Identification) 
     (whole, *_) = list_blocks(twice, "shift", "figure")
     assert len(whole.figure.layout.shapes) == 4
     labels = [button.label for button in whole.figure.layout.updatemenus[0].buttons]
-    assert labels == ["whole", "2→3, 1.6 s", "2→3, 1.6 s"]
+    assert labels == ["whole", "2→3, 1.6 s"]
     once, both = (len(build_section(one, "shift").blocks) for one in (found, twice))
     assert once < both
 

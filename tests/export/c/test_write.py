@@ -127,35 +127,6 @@ def test_runner_tells_a_row_that_it_cannot_take(
     assert len(done.stdout.splitlines()) == 2
 
 
-@pytest.mark.parametrize(("index", "stated"), [(1, 273150), (0, 145750)])
-def test_the_stated_bound_of_operations_follows_from_the_limits_of_the_loops(
-    index: int, stated: int, tmp_path: Path
-) -> None:
-    """Index 0: float, the first branch of `dt_real.h`; 1: double."""
-    text = {path.name: path.read_text("utf-8") for path in write_c(paper_subject(), tmp_path)}
-    terms = int(re.findall(r"#define DT_TERMS (\d+)", text["dt_real.h"])[index])
-    searches, newton = (
-        int(re.findall(rf"#define {name} (\d+)", text["dt_fall.c"])[0])
-        for name in ("SEARCHES", "NEWTON")
-    )
-    expansion = 105 * terms + 7 * terms**2
-    guards = 12 * (searches * (terms**2 + 6 * terms) + newton * 4 * terms)
-    assert expansion + guards == stated
-    assert f"{stated}" in text["dt_model.h"]
-    assert f"{expansion}" in text["dt_model.h"]
-
-
-def test_a_table_of_friction_is_written_point_by_point() -> None:
-    subject = paper_subject()
-    off, on = subject.model.elements
-    law = FrictionTable((0.0, 5.0, 40.0), tuple(np.array((0.14, 0.12, 0.11))))
-    model = replace(subject.model, elements=(off, replace(on, friction=law)))
-    text = write_source(replace(subject, model=model))
-    assert ".clutch[1].friction.points = 3," in text
-    assert ".clutch[1].friction.slip[2] = DT_C(40.0)," in text
-    assert ".clutch[1].friction.mu[0] = DT_C(0.14)," in text
-
-
 def test_what_c_cannot_hold_is_refused() -> None:
     subject = paper_subject()
     off, on = subject.model.elements

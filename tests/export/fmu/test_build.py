@@ -151,17 +151,6 @@ def instance(built: Built) -> Iterator[Instance]:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def test_fmpy_finds_no_fault(built: Built) -> None:
-    assert validate_fmu(str(built.path)) == []
-
-
-def test_the_same_twin_gives_the_same_bytes(built: Built, tmp_path: Path) -> None:
-    again = tmp_path / built.path.name
-    version = FmiVersion(fmpy.read_model_description(str(built.path)).fmiVersion)
-    build_fmu(built.case.subject, again, options(version, built.case))
-    assert again.read_bytes() == built.path.read_bytes()
-
-
 def test_inputs_with_their_rates_meet_the_tight_reference(built: Built, instance: Instance) -> None:
     """FMI 2.0 interpolates inputs; FMI 3.0, which has no such rates, holds them."""
     case = built.case
@@ -207,21 +196,6 @@ def test_parameters_are_tuned_while_it_runs(built: Built, instance: Instance) ->
     assert instance.get("k_o") == [2.0 * case.subject.model.k_o]
     after = instance.run(case, 100, 101)[-1, 1]
     assert after > 1.5 * before
-
-
-def test_a_clutch_opens_where_its_touch_point_is_tuned_above_its_pressure(
-    instance: Instance,
-) -> None:
-    instance.initialize(np.array([1500.0, 0.0, 3e5]))
-    instance.fmu.doStep(0.0, 0.01)
-    (carried,) = instance.get(ONCOMING_TORQUE)
-    assert carried > 500.0
-    instance.set(["B3.P0"], [4e5])
-    instance.fmu.doStep(0.01, 0.01)
-    assert instance.get(ONCOMING_TORQUE) == [0.0]
-    instance.set(["B3.P0"], [8e4])
-    instance.fmu.doStep(0.02, 0.01)
-    assert instance.get(ONCOMING_TORQUE) == pytest.approx([carried], rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -274,26 +248,6 @@ def test_the_parameter_set_inside_names_what_can_be_tuned(built: Built, tmp_path
     }
 
 
-def test_many_instances_at_once(built: Built, instance: Instance) -> None:
-    case, fmu = built.case, instance.fmu
-    instance.initialize(case.inputs[0])
-    expected = instance.run(case, 0, 3)[-1]
-    first, many = fmu.component, []
-    for _ in range(300):
-        instance.instantiate()
-        instance.initialize(case.inputs[0])
-        many.append(fmu.component)
-    for i in range(3):
-        for fmu.component in many:
-            instance.run(case, i, i + 1)
-    for fmu.component in many:
-        assert np.array_equal(instance.get(SPEED, TORQUE), expected)
-        fmu.fmi2FreeInstance(fmu.component) if instance.is_fmi2 else fmu.fmi3FreeInstance(
-            fmu.component
-        )
-    fmu.component = first
-
-
 def _read_packed(path: Path, name: str) -> FloatArray:
     with zipfile.ZipFile(path) as archive:
         text = archive.read(f"extra/org.fmi-standard.fmi-ls-ref/{name}").decode()
@@ -321,21 +275,6 @@ def test_importers_that_set_values_only_meet_the_reference_inside(built: Built) 
     )
     for column, expected in (("engine_speed", result[:, 1]), ("output_torque", result[:, 5])):
         assert np.abs(told[column] - expected).max() < 1e-9 * np.abs(expected).max()
-
-
-def test_experiment_inside_repeats_from_the_archive_alone(built: Built, instance: Instance) -> None:
-    """Stimulus and result that travel with the FMU agree with what it does."""
-    ends = ("-in", "_interpolated-ref" if instance.is_fmi2 else "-ref")
-    stimulus, result = (_read_packed(built.path, f"measured_shift{end}.csv") for end in ends)
-    with zipfile.ZipFile(built.path) as archive:
-        manifest = archive.read("extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml").decode()
-        assert "resources/parameters.ssv" in archive.namelist()
-    assert 'role="experiment/validation"' in manifest
-    assert np.array_equal(stimulus[:, 0], built.case.time)
-    instance.initialize(stimulus[0, 1:])
-    told = instance.run(built.case, 0, built.case.time.size - 1)
-    for column, expected in ((0, result[:, 1]), (1, result[:, 5])):
-        assert np.abs(told[:, column] - expected[1:]).max() < 1e-9 * np.abs(expected).max()
 
 
 def test_sources_inside_are_complete(built: Built, tmp_path: Path) -> None:

@@ -40,13 +40,6 @@ def _compare(
     return text
 
 
-def test_a_network_without_inputs_has_no_table(tmp_path: Path) -> None:
-    shaft = build_element("spring_damper", "shaft", a="a", b="b", stiffness=200.0, damping=1.0)
-    elements = [_inertia("a", 0.5), _inertia("b", 2.0), shaft]
-    text = _compare(elements, {}, Start({"a": 10.0, "b": 0.0}, {"shaft": 0.02}), tmp_path)
-    assert "CombiTimeTable" not in text
-
-
 def test_a_sine_is_an_equation_beside_a_table_of_samples(tmp_path: Path) -> None:
     elements = [
         _inertia("a", 0.5),
@@ -60,16 +53,6 @@ def test_a_sine_is_an_equation_beside_a_table_of_samples(tmp_path: Path) -> None
     text = _compare(elements, inputs, Start({"a": 1.0}), tmp_path)
     assert "timeEvents=Modelica.Blocks.Types.TimeEvents.AtDiscontinuities" in text
     assert "driveline.u_samples = inputs.y[1];" in text
-
-
-def test_a_torque_between_two_nodes_is_torque2(tmp_path: Path) -> None:
-    elements = [
-        _inertia("a", 0.5),
-        _inertia("b", 0.8),
-        build_element("torque", "T", node="a", reaction="b", input="wave"),
-    ]
-    text = _compare(elements, {"wave": Sine(20.0, 3.0)}, Start({"a": 1.0, "b": 2.0}), tmp_path)
-    assert "Sources.Torque2 T;" in text
 
 
 def test_a_converter_starts_with_its_pump_at_rest(tmp_path: Path) -> None:
@@ -114,17 +97,6 @@ def test_a_viscous_coupling_moves_as_in_the_core_in_either_sense(tmp_path: Path)
     inputs: dict[str, Signal | Sine] = {"T": Sine(60.0, 1.0)}
     text = _compare(elements, inputs, Start({"a": 20.0, "b": 0.0}), tmp_path)
     assert "ViscousCoupling coupling(characteristic=[-10.0, -15.0;" in text
-
-
-def test_a_road_load_that_starts_locked_is_an_initial_equation() -> None:
-    load = build_element("road_load", "load", node="a", constant=5.0, rolling=700.0, aero=0.9)
-    start = Start({"a": 0.0}, locked=("load",))
-    text = format_package("net", [_inertia("a", 1.0), load], Run({}, start, (0.0, 1.0)))
-    assert "driveline.load.w = 0;" in text
-    assert "der(driveline" not in text
-    unknown = Start({"a": 0.0}, locked=("lead",))
-    with pytest.raises(InputError, match="'lead' cannot start locked"):
-        format_package("net", [_inertia("a", 1.0), load], Run({}, unknown, (0.0, 1.0)))
 
 
 def test_an_input_that_the_run_lacks_is_named() -> None:

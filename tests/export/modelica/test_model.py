@@ -89,13 +89,3 @@ def test_inputs_are_sampled_at_every_moment_that_any_of_them_has() -> None:
     assert "table=[0.25, 2.5, 1.0;\n      0.5, 5.0, 2.0;\n      1.0, 10.0, 2.0]" in text
     assert "driveline.u_b = inputs.y[2];" in text
     assert "StartTime=0.25, StopTime=1.0" in text
-
-
-def test_an_input_that_jumps_jumps_in_the_table() -> None:
-    elements: list[Element] = [
-        {"type": "inertia", "name": "J", "node": "n", "inertia": 1.0},
-        {"type": "torque", "name": "T", "node": "n", "input": "a"},
-    ]
-    steps = Signal(np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0]), np.array([7, 0, 0, 5, 5, 9.0]))
-    text = format_package("jump", elements, Run({"a": steps}, Start({"n": 0.0}), (0.0, 2.0)))
-    assert "table=[0.0, 0.0;\n      1.0, 0.0;\n      1.0, 5.0;\n      2.0, 5.0]" in text

@@ -117,13 +117,6 @@ def test_what_a_tool_writes_is_read_and_other_objects_are_named() -> None:
     assert found.skipped == ("FESTWERT K_Text", "KENNFELD KF_Any")
 
 
-def test_tabs_separate_as_blanks_do() -> None:
-    tabbed = re.sub(r"(?m)^ *(\S+) +", r"\t\1\t", FROM_A_TOOL)
-    assert parse_parameters(tabbed, ParameterFormat.DCM) == parse_parameters(
-        FROM_A_TOOL, ParameterFormat.DCM
-    )
-
-
 def test_an_object_without_end_is_refused_by_name() -> None:
     with pytest.raises(FileFormatError, match="K_P0"):
         parse_parameters(

@@ -15,10 +15,8 @@ from drivetwin.export.parameters.content import Axis, Curve, ParameterSet
 from drivetwin.export.parameters.files import (
     ParameterFormat,
     read_parameters,
-    write_parameters,
 )
 from drivetwin.export.parameters.of_twin import collect_parameters
-from drivetwin.export.targets import Names
 from tests.export.parameters.sample import (
     SETS,
     format_parameters,
@@ -55,22 +53,6 @@ def test_round_trip(kind: ParameterFormat, content: ParameterSet) -> None:
     assert [one.values for one in held.curves] == [one.values for one in content.curves]
     assert [one.axis.points for one in held.curves] == [one.axis.points for one in content.curves]
     assert [one.unit for one in held.entries] == [one.unit for one in content.entries]
-
-
-@EVERY_FORMAT
-@pytest.mark.parametrize("names", Names)
-def test_parameters_of_a_twin_survive_the_file(
-    kind: ParameterFormat, names: Names, tmp_path: Path
-) -> None:
-    content = collect_parameters(twin(), names)
-    path = tmp_path / f"twin.{kind}"
-    write_parameters(content, path, kind)
-    back = read_parameters(path)
-    assert back.skipped == ()
-    assert [one.value for one in back.scalars] == [one.value for one in content.scalars]
-    assert [one.values for one in back.curves] == [one.values for one in content.curves]
-    assert [one.unit for one in back.entries] == [one.unit for one in content.entries]
-    assert "no value of te_delay: the engine torque is constant" in path.read_text("utf-8")
 
 
 @EVERY_FORMAT

@@ -17,18 +17,6 @@ from drivetwin.simulation.dual_clutch import Stribeck
 from tests.export.parameters.sample import twin
 
 
-def test_every_value_has_its_unit_meaning_and_interval() -> None:
-    k_o = collect_parameters(twin())["k_o"]
-    assert isinstance(k_o, Scalar)
-    assert (k_o.value, k_o.unit) == (1.76e5, "N*m/rad")
-    assert (
-        k_o.text
-        == "output shaft stiffness (eq. 8, 14); identified, 95 %: 1.725e+05 .. 1.795e+05 N*m/rad"
-    )
-    weak = collect_parameters(twin())["c_o"]
-    assert "; weak, 95 %" in weak.text
-
-
 def test_a_value_of_the_card_states_no_interval() -> None:
     """Its deviation is zero, and an interval without width would tell it as known exactly."""
     known = Estimate("P0.B3", 8e4, 0.0, Verdict.DESIGN, "card")
@@ -64,18 +52,6 @@ def test_an_identified_drum_stands_once(ending: str, value: float) -> None:
     assert "design value" in drums["drum.B2"].text
 
 
-def test_friction_states_its_verdict() -> None:
-    given = twin()
-    borrowed = replace(given.friction["B3"], verdict=Verdict.DESIGN, reason="Law of B3.")
-    content = collect_parameters(replace(given, friction={**given.friction, "B2": borrowed}))
-    texts = {one.name: one.text for one in content.scalars}
-    texts |= {one.name: one.text for one in content.curves}
-    assert "; identified, " in texts["mu.B3"]
-    assert texts["mu_c.B3"].endswith("; identified")
-    assert texts["mu.B2"].endswith("; design value, Law of B3.")
-    assert texts["mu_c.B2"].endswith("; design value")
-
-
 @pytest.mark.parametrize("v_s", [1.0, 5.0, 15.0, 60.0])
 @pytest.mark.parametrize("mu_s", [0.08, 0.20])
 def test_the_curve_keeps_to_a_law_that_bends_near_zero_slip(v_s: float, mu_s: float) -> None:
@@ -87,15 +63,6 @@ def test_the_curve_keeps_to_a_law_that_bends_near_zero_slip(v_s: float, mu_s: fl
     slip = np.linspace(0.0, 300.0, 20001)
     told = np.interp(slip, curve.axis.points, curve.values)
     assert told == pytest.approx(law.evaluate(slip), rel=1e-3)
-
-
-def test_a_table_keeps_its_own_points() -> None:
-    given = twin()
-    table = replace(given.friction["B3"], stribeck=None)
-    curve = collect_parameters(replace(given, friction={"B3": table}))["mu.B3"]
-    assert isinstance(curve, Curve)
-    assert curve.axis.points == (0.0, *table.slip.tolist())
-    assert curve.values == (table.mu[0], *table.mu.tolist())
 
 
 def test_a_converter_brings_two_curves_over_the_speed_ratio() -> None:

@@ -46,12 +46,6 @@ def test_clutch_torque_of_the_block_is_that_of_the_twin(named: ParameterSet) -> 
     assert static == pytest.approx(element.peak * float(element.friction.evaluate(np.zeros(1))[0]))
 
 
-def test_an_element_without_a_curve_has_its_geometry_only(named: ParameterSet) -> None:
-    assert _value(named, "Aeff.B2") == 3.78e-2
-    with pytest.raises(KeyError):
-        named["mu_s.B2"]
-
-
 def test_capacity_factor_gives_the_pump_torque_in_drive(named: ParameterSet) -> None:
     factor = _curve(named, "tc_capacity_factor")
     points = CONVERTER.speed_ratio
@@ -64,9 +58,3 @@ def test_capacity_factor_gives_the_pump_torque_in_drive(named: ParameterSet) -> 
     assert torque == pytest.approx(
         CONVERTER.compute_pump_torque(np.full(turbine.size, pump), turbine)
     )
-
-
-def test_the_rest_keeps_its_value_under_the_name_of_the_blocks(named: ParameterSet) -> None:
-    assert _value(named, "k_shaft") == 1.76e5
-    assert _value(named, "ratio_final_drive") == 5.38
-    assert _value(named, "eta") == 0.85

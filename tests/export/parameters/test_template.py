@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.cli import main
 from drivetwin.errors import InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import (
@@ -29,8 +28,7 @@ from drivetwin.export.parameters.template import (
     restore_entries,
 )
 from drivetwin.export.parameters.to_twin import update_twin
-from drivetwin.files.twin_file import save_twin
-from tests.export.parameters.sample import format_parameters, reread, twin
+from tests.export.parameters.sample import reread, twin
 
 RPM = math.pi / 30.0
 EXAMPLE = """
@@ -119,16 +117,6 @@ def test_edited_values_come_back_in_si(template: Template) -> None:
     assert friction.mu == pytest.approx(1.1 * np.array(curve.values))
 
 
-def test_a_value_for_what_was_not_identified_is_converted() -> None:
-    own = collect_parameters(twin())
-    assert "te_delay" not in {one.name for one in own.entries}
-    template = make_template(te_delay='label = "Eng_tDly_C"\nunit = "ms"')
-    content = ParameterSet("", (Scalar("Eng_tDly_C", 20.0, "ms"),))
-    (restored,) = restore_entries(content, own, template).scalars
-    assert restored == Scalar("te_delay", 0.02, "s")
-    assert apply_template(own, template, ["te_delay"]).entries == ()
-
-
 LABEL = 'label = "a"\n'
 WRONG = {
     "no such parameter; did you mean 'eta'": ("etta", LABEL),
@@ -163,12 +151,6 @@ def test_a_damaged_template_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError) as refused:
         read_template(path)
     assert refused.value.where.file == str(path)
-
-
-def test_ssv_has_si_units_only(template: Template) -> None:
-    content = apply_template(collect_parameters(twin()), template)
-    with pytest.raises(InputError, match="is not made of kg"):
-        format_parameters(content, ParameterFormat.SSV)
 
 
 _NUMBERS = st.floats(-1e12, 1e12)
@@ -209,27 +191,3 @@ def test_round_trip(
     for one, before in zip(restored, own.scalars, strict=True):
         assert one.name == before.name
         assert one.value == pytest.approx(factor * before.value, rel=1e-12)
-
-
-def test_export_and_simulate_by_a_template(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    save_twin(tmp_path / "twin.toml", twin())
-    (tmp_path / "t.toml").write_text(EXAMPLE, encoding="utf-8")
-    target = str(tmp_path / "project.dcm")
-    arguments = ["export", str(tmp_path / "twin.toml"), "--to", "dcm", "-o", target]
-    assert main([*arguments, "--template", str(tmp_path / "t.toml")]) == 0
-    text = Path(target).read_text(encoding="utf-8")
-    assert "FESTWERT Clt_pKissB3_C" in text
-    assert 'EINHEIT_W "bar"' in text
-    assert 'EINHEIT_X "rpm"' in text
-    capsys.readouterr()
-    (tmp_path / "t.toml").write_text('[parameters.eta]\nlabel = "Gbx.eta"\n', encoding="utf-8")
-    matlab = [*arguments[:3], "m", *arguments[4:], "--template", str(tmp_path / "t.toml")]
-    assert main([*arguments, "--template", str(tmp_path / "t.toml")]) == 0
-    capsys.readouterr()
-    assert main(matlab) == 2
-    assert "m files cannot hold the labels Gbx.eta" in " ".join(capsys.readouterr().err.split())
-    (tmp_path / "t.toml").write_text('[parameters.etta]\nlabel = "a"\n', encoding="utf-8")
-    assert main([*arguments, "--template", str(tmp_path / "t.toml")]) == 2
-    assert "did you mean 'eta'" in capsys.readouterr().err

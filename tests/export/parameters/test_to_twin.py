@@ -51,28 +51,6 @@ def test_edited_values_reach_the_simulation(kind: ParameterFormat) -> None:
     assert update_twin(twin(), _edited(eta=0.9)).twin.covariance is None
 
 
-def test_an_estimated_ratio_is_written_once_and_read_back() -> None:
-    given = replace(twin(), i_in=1.2)
-    gear = given.get_gear("3").ratio / 1.2
-    ratios = {
-        name: Estimate(name, value, 1e-4, Verdict.IDENTIFIED, "likelihood")
-        for name, value in (("ratio_3", gear), ("i_f", given.final_drive))
-    }
-    given = replace(given, parameters={**given.parameters, **ratios})
-    written = collect_parameters(given)
-    assert update_twin(given, reread(written, ParameterFormat.DCM)).changed == ()
-    scalars = tuple(
-        replace(one, value=1.1 * one.value) if one.name in ratios else one
-        for one in written.scalars
-    )
-    edited = replace(written, scalars=scalars)
-    update = update_twin(given, edited)
-    assert set(update.changed) == set(ratios)
-    assert update.twin.get_gear("3").ratio == pytest.approx(1.1 * gear * 1.2, rel=1e-12)
-    assert update.twin.parameters["ratio_3"].value == pytest.approx(1.1 * gear, rel=1e-12)
-    assert update.twin.final_drive == update.twin.parameters["i_f"].value
-
-
 @pytest.mark.parametrize("told", [False, True])
 def test_every_name_that_is_told_as_changed_acts(told: bool) -> None:
     given = replace(twin(), load_law=LoadLaw(aero=7.0, std=0.5, mean_speed=14.0))
@@ -141,12 +119,6 @@ def test_a_value_in_another_unit_is_refused() -> None:
         update_twin(twin(), ParameterSet("t", (Scalar("te_delay", 10.0, "ms"),)))
 
 
-def test_a_unit_that_a_tool_spells_otherwise_or_drops_is_the_same() -> None:
-    for unit in ("N/m^2", "1"):
-        given = ParameterSet("t", (Scalar("P0.B3", 9e4, unit),))
-        assert update_twin(twin(), given).twin.get_value("P0.B3", 0.0) == 9e4
-
-
 def test_a_name_that_is_given_twice_is_refused() -> None:
     """Also where a format spells it otherwise."""
     twice = ParameterSet("t", (Scalar("P0.B3", 9e4, "Pa"), Scalar("P0_B3", 8e4, "Pa")))
@@ -160,27 +132,9 @@ def test_zero_is_refused_where_a_run_divides_by_it(name: str) -> None:
         update_twin(twin(), ParameterSet("t", (Scalar(name, 0.0),)))
 
 
-def test_a_number_that_became_a_curve_is_refused() -> None:
-    (curve,) = collect_parameters(twin()).curves
-    with pytest.raises(InputError, match="gives k_o as a curve, not as a number"):
-        update_twin(twin(), ParameterSet("t", (), (replace(curve, name="k_o"),)))
-
-
 def test_what_the_log_could_not_tell_may_be_given_and_other_names_are_told() -> None:
     given = ParameterSet("t", (Scalar("te_delay", 0.01, "s"), Scalar("wheel_colour", 3.0)))
     update = update_twin(twin(), given)
     assert update.changed == ("te_delay",)
     assert (update.idle, update.unknown) == ((), ("wheel_colour",))
     assert update.twin.get_value("te_delay", 0.0) == 0.01
-
-
-def test_a_load_that_grows_with_speed_is_written_and_read() -> None:
-    given = replace(twin(), load_law=LoadLaw(aero=7.0, std=0.5, mean_speed=14.0))
-    content = collect_parameters(given)
-    assert content["load.aero"].unit == "N*m*s^2/rad^2"
-    edited = tuple(
-        replace(one, value=9.0) if one.name == "load.aero" else one for one in content.scalars
-    )
-    update = update_twin(given, replace(content, scalars=edited))
-    assert update.changed == ("load.aero",)
-    assert update.twin.load_law == LoadLaw(aero=9.0, std=0.5, mean_speed=14.0)
