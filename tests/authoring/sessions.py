@@ -53,9 +53,15 @@ def make_session(
     return Session(parse_options(options, sources), sources)
 
 
-def make_draft(log: Path | None = None, *options: Any, mapping: Path | None = None) -> Session:
+def make_draft(
+    log: Path | None = None,
+    single: Mapping[str, str] | None = None,
+    elements: Iterable[str] = (),
+    sensors: Iterable[str] = (),
+    mapping: Path | None = None,
+) -> Session:
     """Return a session in which the rest is guessed or left open."""
-    session = make_session(*options, log=log, mapping=mapping)
+    session = make_session(single, elements, sensors, log, mapping)
     session.fill_draft()
     return session
 

@@ -13,9 +13,7 @@ from pathlib import Path
 
 from playwright.sync_api import FloatRect, Locator, Page, expect
 
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 GIVEN = ROOT.parent / "shared" / "logs" / "truck_a.csv"
@@ -59,6 +57,12 @@ def _write_wrong_unit(log: Path) -> str:
     return columns[place]
 
 
+def synthesize(log: Path, seed: int) -> tuple[Path, Path]:
+    """Write a synthetic log and its card."""
+    assert main(["synth", "-o", str(log), "--scenario", "paper_steps", "--seed", str(seed)]) == 0
+    return log, log.with_suffix(".card.toml")
+
+
 @contextmanager
 def serve(folder: Path) -> Iterator[Bench]:
     """Run the program in a folder with truck_a, or a synthetic log where that is absent."""
@@ -67,7 +71,7 @@ def serve(folder: Path) -> Iterator[Bench]:
         log.write_bytes(GIVEN.read_bytes())
         card.write_bytes((ROOT / "examples" / "vehicles" / "truck_a.toml").read_bytes())
     else:
-        log, card, _ = write_run(folder / "bench.csv", run(load_scenario("paper_steps"), seed=1))
+        log, card = synthesize(folder / "bench.csv", 1)
     wrong = _write_wrong_unit(log)
     with serve_folder(folder) as address:
         yield Bench(address, folder, log.name, card.name, wrong)

@@ -15,9 +15,8 @@ from playwright.sync_api import Browser, Page
 
 from drivetwin.cli import main
 from drivetwin.report.html import save_report
-from drivetwin.validation.simulate_log import attach_fit
 from tests.browser.watch import grave_findings
-from tests.report.sample import identification, log, validation
+from tests.report.sample import log
 
 pytestmark = pytest.mark.browser
 
@@ -44,7 +43,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def long_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Report of a log of 200 s at 1 kHz."""
     path = tmp_path_factory.mktemp("long") / "report.html"
-    found = attach_fit(identification(), [validation()])
+    found = simulated()
     save_report(path, found, log(np.arange(0.0, 200.0, 1e-3)))
     return path
 

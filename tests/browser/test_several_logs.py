@@ -10,14 +10,12 @@ from typing import Literal
 import pytest
 from playwright.sync_api import Page, expect
 
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
 from tests.browser.bench import (
     PATIENCE,
     expect_message,
     serve_folder,
     show_view,
+    synthesize,
     wait_for_rest,
     wait_for_whole_contents,
 )
@@ -36,7 +34,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A running workbench in a folder with two logs of one vehicle and its card."""
     folder = tmp_path_factory.mktemp("several")
     for seed, name in enumerate(("first", "second"), 1):
-        write_run(folder / f"{name}.csv", run(load_scenario("paper_steps"), seed=seed))
+        synthesize(folder / f"{name}.csv", seed)
     (folder / "second.card.toml").unlink()
     with serve_folder(folder) as running:
         yield running

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.read import read_raw
 from drivetwin.shifts.shift import Shift
-from drivetwin.validation.simulate_log import Validation, format_signals, simulate_shift
+from drivetwin.validation.simulate_log import format_signals, simulate_shift
 from tests.observer.conftest import Bench, bench
 from tests.shifts.test_shift_split_gears import CHAIN
 

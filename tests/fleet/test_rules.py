@@ -34,16 +34,18 @@ def test_rules_give_each_log_its_card_unit_and_fields(rules_file: Path, tmp_path
     """The first rule that fits decides."""
     logs = tmp_path / "logs"
     wanted = {
-        "workshop/unit_07/a.csv": ("left out", "07"),
         "truck_a/unit_07/a_1234km.csv": ("truck A", "07"),
         "truck_a/unit_01/a.csv": ("all others", "01"),
     }
-    for number, name in enumerate(wanted):
+    for number, name in enumerate(["workshop/unit_07/a.csv", *wanted]):
         path = logs / name
         path.parent.mkdir(parents=True)
         path.write_text(f"time,EngTrq,SpdIn\ns,Nm,rpm\n0,1,{number}\n1,2,{number}\n")
-    scanned = {str(one.file.path): one for one in scan_files(rules_file, [str(logs)])}
-    found = {name: scanned[str(logs / name)].file for name in wanted}
+    scanned = scan_files(rules_file, [str(logs)])
+    (left_out,) = [one.path for one in scanned if not hasattr(one, "file")]
+    assert left_out == str(logs / "workshop/unit_07/a.csv")
+    files = {str(one.file.path): one.file for one in scanned if hasattr(one, "file")}
+    found = {name: files[str(logs / name)] for name in wanted}
     assert {name: (one.rule, one.unit) for name, one in found.items()} == wanted
     assert found["truck_a/unit_07/a_1234km.csv"].fields["odometer_km"] == 1234.0
     rule = read_rules(rules_file).rules[1]

@@ -12,13 +12,13 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.validation import compute_fit
+from drivetwin.estimation.result.validation import SignalTrace, Validation, compute_fit
 from drivetwin.findings import Code, report
 from drivetwin.report.html import build_report_sections
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
-from drivetwin.validation.simulate_log import SignalTrace, Validation, attach_fit, clip_phases
+from drivetwin.validation.simulate_log import attach_fit, clip_phases
 from drivetwin.vehicle.card import ElementSpec, Gear
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
