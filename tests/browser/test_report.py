@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page
 from drivetwin.cli import main
 from drivetwin.report.html import save_report
 from tests.browser.watch import grave_findings
-from tests.report.sample import log
+from tests.report.sample import log, simulated
 
 pytestmark = pytest.mark.browser
 
