@@ -42,7 +42,7 @@ def test_a_moved_boundary_moves_both_phases_it_parts(identified: Any, shift: Any
     fresh = _move(identified, {Boundary.LOCKUP: late})
     assert (fresh.lockup_time, fresh.inertia_phase[1], fresh.after[0]) == (late, late, late)
     with pytest.raises(DrivetwinError, match=r"'3 inertia phase starts' at .* before '2 torque"):
-        _move(identified, {Boundary.TORQUE: shift.inertia_phase[0] + 0.01})
+        _move(identified, {Boundary.TORQUE: time + 0.01})
 
 
 @given(st.lists(st.floats(-2.0, 12.0), min_size=5, max_size=5))
