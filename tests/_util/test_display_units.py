@@ -6,7 +6,6 @@ from __future__ import annotations
 import pytest
 
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.shifts.quality import QUALITY_UNITS
 
 
 @pytest.mark.parametrize(
@@ -30,8 +29,3 @@ def test_value_and_half_width_share_their_last_digit(
     value: float, unit: str, half: float | None, text: str
 ) -> None:
     assert format_with_unit(value, unit, half) == text
-
-
-@pytest.mark.parametrize("unit", sorted({*QUALITY_UNITS.values()}))
-def test_no_displayed_unit_is_in_ascii(unit: str) -> None:
-    assert not set("*^") & set(format_with_unit(1.0, unit))

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from drivetwin import load_card, load_twin
-from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError, FileFormatError
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
@@ -20,19 +19,17 @@ from drivetwin.files.result_file import load_result
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.sources import Sources
 from drivetwin.gearbox import load_gearbox
-from drivetwin.logs.formats.can.database import read_database
-from drivetwin.logs.read import read_raw
+from drivetwin.logs.read import read_log, read_raw
 
 READERS: tuple[Callable[[Path], object], ...] = (
     read_raw,
     load_card,
-    read_mapping,
+    lambda path: read_log(__file__, None, path),
     load_gearbox,
     load_powertrain,
     read_rules,
     load_twin,
     load_result,
-    lambda path: read_database((path,)),
     lambda path: Sources([], path).count(),
     read_template,
     lambda path: read_parameters(path, ParameterFormat.DCM),

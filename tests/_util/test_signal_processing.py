@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,10 +11,8 @@ from scipy.signal import butter, sosfiltfilt
 
 from drivetwin._util.signal_processing import (
     compute_moving_mean,
-    estimate_rounding_step,
     filter_zero_phase,
     find_large_steps,
-    find_true_runs,
 )
 
 
@@ -24,30 +20,6 @@ from drivetwin._util.signal_processing import (
 @pytest.mark.parametrize("size", [0, 1, 2, 3, 9, 20])
 def test_a_constant_is_kept_up_to_both_ends(width: int, size: int) -> None:
     assert compute_moving_mean(np.full(size, 8e5), width) == pytest.approx(np.full(size, 8e5))
-
-
-@pytest.mark.parametrize("width", [3, 5, 11, 41])
-def test_a_ramp_is_kept_up_to_both_ends(width: int) -> None:
-    ramp = np.linspace(-3.0, 7.0, 40)
-    assert compute_moving_mean(ramp, width) == pytest.approx(ramp)
-
-
-def test_numbers_that_are_no_multiples_apart_have_a_resolution_but_no_rounding_step() -> None:
-    values = np.random.default_rng(2).normal(size=100)
-    assert estimate_rounding_step(values) == 0.0
-    assert estimate_rounding_step(0.5 * np.round(values / 0.5)) == pytest.approx(0.5)
-
-
-def test_few_changes_show_no_rounding_step() -> None:
-    values = np.repeat([0.0, 1.0, 0.0, 2.0], 20)
-    assert estimate_rounding_step(values) == 0.0
-
-
-@given(mask=st.lists(st.booleans(), max_size=40), least=st.integers(1, 4))
-def test_true_runs_of_a_least_length_are_all_of_them(mask: list[bool], least: int) -> None:
-    runs = find_true_runs(np.asarray(mask, np.bool_), least)
-    edges = "".join("x" if one else " " for one in mask)
-    assert runs == [found.span() for found in re.finditer("x+", edges) if len(found[0]) >= least]
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 65535, 65536, 65537, 150_000])

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin import load_card
-from drivetwin._util.toml import format_key, format_text, parse_toml
+from drivetwin._util.toml import parse_toml
 from drivetwin.errors import DrivetwinError
 from drivetwin.export.parameters.template import read_template
 
@@ -73,10 +73,3 @@ def test_the_limits_themselves_are_allowed() -> None:
     }
     depth = MAX_DEPTH - 1
     assert parse_toml(f"x = {depth * '['}{depth * ']'}")
-
-
-@given(st.text(st.characters(exclude_categories=["Cs"])))
-def test_written_texts_and_keys_read_back(text: str) -> None:
-    line = f"{format_key(text)} = {format_text(text)}"
-    assert line.isprintable()
-    assert parse_toml(line) == {text: text}

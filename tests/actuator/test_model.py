@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -53,7 +53,7 @@ def integrate(model: ActuatorModel, held: HeldSignal, initial: float, at: FloatA
     return np.concatenate(parts)
 
 
-@pytest.mark.parametrize("damping", [0.3, 0.9, 1.0 - 1e-7, 1.0, 1.0 + 1e-4, 1.4, 3.0])
+@pytest.mark.parametrize("damping", [0.3, 1.0 - 1e-7, 1.0, 3.0])
 def test_the_lag_is_that_of_an_integration(damping: float) -> None:
     random = np.random.default_rng(3)
     held = HeldSignal(np.arange(0.0, 0.4, 0.02), BAR * random.integers(0, 9, 20).astype(float))
@@ -70,12 +70,6 @@ def test_one_step_is_the_textbook_response() -> None:
     assert response == pytest.approx(exact, abs=1e-6)
 
 
-def test_falling_has_its_own_time_constant() -> None:
-    falling, at = hold((0.0, 1.0), (0.1, 0.0)), np.array([0.13])
-    assert ActuatorModel(0.0, 0.01, 0.09).compute_pressure(falling, at)[0] > 0.9 * BAR
-    assert ActuatorModel(0.0, 0.09, 0.01).compute_pressure(falling, at)[0] < 0.3 * BAR
-
-
 def test_an_overshoot_falls_with_the_time_constant_of_falling() -> None:
     held, model = hold((0.0, 0.0), (0.1, 1.0)), ActuatorModel(0.0, 0.02, 0.06, 0.4)
     at = np.linspace(0.0, 1.0, 1001)
@@ -84,7 +78,6 @@ def test_an_overshoot_falls_with_the_time_constant_of_falling() -> None:
     assert np.abs(response - integrate(model, held, 0.0, at)).max() < 5.0
 
 
-@settings(max_examples=60)
 @given(
     LEVELS, st.floats(0.002, 0.3), st.floats(0.002, 0.3), st.floats(0.2, 3.0), st.floats(0.0, 0.3)
 )
@@ -160,18 +153,6 @@ def test_a_clutch_is_full_at_the_same_time_however_often_the_command_is_repeated
     assert late / BAR == pytest.approx([level])
 
 
-def test_times_that_do_not_increase_are_refused() -> None:
-    with pytest.raises(InputError, match="do not increase"):
-        QUICK.compute_pressure(hold((0.0, 1.0)), np.array([0.2, 0.1]))
-
-
-def test_nothing_moves_before_the_dead_time() -> None:
-    at = np.array([0.0, 0.129, 0.131, 0.2])
-    pressure = MODEL.compute_pressure(STEP, at)
-    assert pressure[:2].tolist() == [0.0, 0.0]
-    assert 0.0 < pressure[2] < pressure[3]
-
-
 def test_the_pressure_waits_at_the_kiss_pressure_and_ends_below_the_command() -> None:
     full = 0.13 + 0.15 / np.sqrt(4.9 - 1.0)
     pressure = MODEL.compute_pressure(STEP, np.array([full - 1e-4, 2.0]))
@@ -194,3 +175,25 @@ def test_values_outside_their_bounds_are_refused(name: str) -> None:
         replace(MODEL, **{name: QUANTITIES[name].upper * 1.01})
     with pytest.raises(InputError, match=QUANTITIES[name].label):
         replace(MODEL, **{name: QUANTITIES[name].lower - 0.01})
+
+
+def test_a_value_holds_to_the_next_and_before_the_first() -> None:
+    held = HeldSignal(np.array([1.0, 2.0, 3.0]), np.array([5.0, 5.0, 7.0]))
+    assert held.evaluate(np.array([0.0, 1.0, 2.99, 3.0, 9.0])).tolist() == [5, 5, 5, 7, 7]
+    changes = held.drop_repeated()
+    assert changes.time.tolist() == [1.0, 3.0]
+    assert changes.evaluate(np.array([2.5, 3.5])).tolist() == [5, 7]
+
+
+@pytest.mark.parametrize(
+    ("time", "values", "says"),
+    [
+        ([], [], "0 times"),
+        ([0.0, 1.0], [1.0], "2 times and 1 values"),
+        ([0.0, 0.0], [1.0, 2.0], "do not increase"),
+        ([0.0, 1.0], [1.0, np.nan], "not finite"),
+    ],
+)
+def test_other_signals_are_refused(time: list[float], values: list[float], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        HeldSignal(np.array(time), np.array(values))

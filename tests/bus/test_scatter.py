@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.bus.scatter import ShiftValue, combine
-from drivetwin.vehicle.spec import Z95
+from drivetwin.estimation.result.estimate import Z95
 
 
 def draw(rng: np.random.Generator, tau: float, count: int = 8) -> list[ShiftValue]:

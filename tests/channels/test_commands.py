@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.commands import find_command_step
-from drivetwin.channels.roles import Quantity, make_pressure_role
+from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import MissingChannelError
 from drivetwin.findings import Code
@@ -46,12 +46,13 @@ def test_commands_alone_are_refused_by_their_cause(name: str, mapped: bool, tmp_
 
 def make_pressure(values: FloatArray, step: float) -> Channel:
     time = np.arange(values.size) * np.float64(step)
-    return Channel(make_pressure_role("B3"), Quantity.PRESSURE, time, values, "PrsBrk3", "Pa")
+    return Channel("pressure.B3", Quantity.PRESSURE, time, values, "PrsBrk3", "Pa")
 
 
-@pytest.mark.parametrize("step", [0.001, 0.01, 0.02])
-@pytest.mark.parametrize("code", [5e3, 1.6e4, 1e5])
-@pytest.mark.parametrize("fill", [1e5, 5e5, 1e7])
+@pytest.mark.parametrize(
+    ("step", "code", "fill"),
+    [(0.001, 5e3, 1e5), (0.01, 1.6e4, 5e5), (0.02, 1e5, 1e7), (0.01, 1e5, 1e5), (0.02, 1.6e4, 5e5)],
+)
 def test_a_rounded_ramp_does_not_step(step: float, code: float, fill: float) -> None:
     """A pressure that rises by `fill` a second to 8 bar, in codes of up to an eighth of that.
 

@@ -4,22 +4,29 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
 
-from drivetwin.channels.filling import Interpolation, find_filling
-from drivetwin.channels.line_corners import estimate_resolution
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from tests.shifts.fixtures import shared
 from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
 
 STEP = 1e-3
+
+
+def find_filling(time: FloatArray, values: FloatArray) -> Any:
+    """Filling of a column of a file, None if it was measured at each row."""
+    return RawChannel("n", "rpm", time, values).filling
+
+
 NOISE = 0.3
 FACTORS = (2, 3, 10, 20, 7.5)
 KINDS = ("linear", "spline", "pchip", "makima")
@@ -52,9 +59,7 @@ def check_filling(
     time = np.arange(np.ceil(phase), 4900.0) * STEP
     found = find_filling(time, np.round(fill(knots, values, kind, time), decimals))
     assert found is not None
-    assert found.interpolation is (
-        Interpolation.LINEAR if kind == "linear" else Interpolation.CUBIC
-    )
+    assert found.interpolation.name == ("LINEAR" if kind == "linear" else "CUBIC")
     assert found.period == pytest.approx(factor * STEP, rel=1e-3)
     assert found.time.size == pytest.approx(4.9 / (factor * STEP), rel=0.02)
     # Instants and values: those that were measured, within what the rounding hides.
@@ -92,7 +97,6 @@ def test_a_text_of_significant_digits_is_no_filling(digits: int) -> None:
     time = np.arange(0.0, 30.0, 1e-2)
     speed = 120.0 * (1.0 - np.exp(-0.2 * time)) + 0.3 * np.sin(7.0 * time) * np.exp(-0.3 * time)
     written = np.array([float(f"{one:.{digits}g}") for one in speed])
-    assert estimate_resolution(written) == pytest.approx(10.0 ** (3 - digits))
     assert find_filling(time, written) is None
 
 
@@ -111,7 +115,6 @@ def test_a_long_record_is_judged_like_a_short_one(filled: bool) -> None:
         assert found.time.size == pytest.approx(60.0 / (7.5 * STEP), rel=0.02)
 
 
-@settings(max_examples=25)
 @given(
     seed=st.integers(0, 1000),
     step=st.sampled_from([0.0, 0.03, 0.3, 3.0]),
@@ -126,8 +129,9 @@ def test_leaves_measured_samples_alone(seed: int, step: float, rate: int) -> Non
     assert find_filling(time, values) is None
 
 
-@pytest.mark.parametrize("decimals", [3, 6, 12])
-@pytest.mark.parametrize("apart", [(3.0, 5.0), (4.0, 9.0), (8.0, 12.0)])
+@pytest.mark.parametrize(
+    ("decimals", "apart"), [(3, (3.0, 5.0)), (6, (4.0, 9.0)), (12, (8.0, 12.0))]
+)
 def test_finds_knots_of_messages_that_jitter(apart: tuple[float, float], decimals: int) -> None:
     """Messages arrive unevenly; lines meet where they arrived."""
     rng = np.random.default_rng(1)
@@ -136,7 +140,7 @@ def test_finds_knots_of_messages_that_jitter(apart: tuple[float, float], decimal
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.round(np.interp(time, knots, measure_speed(knots, 3)), decimals))
     assert found is not None
-    assert found.interpolation is Interpolation.LINEAR
+    assert found.interpolation.name == "LINEAR"
     nearest = np.abs(found.time[1:-1, np.newaxis] - knots).min(axis=1)
     assert np.quantile(nearest, 0.95) < max(10.0**-decimals, 1e-12)
 
@@ -148,7 +152,7 @@ def test_names_a_filling_without_lines() -> None:
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
     assert found is not None
-    assert found.interpolation is Interpolation.UNKNOWN
+    assert found.interpolation.name == "UNKNOWN"
     assert found.time.size == 0
 
 
@@ -159,11 +163,12 @@ def test_names_a_filling_of_short_uneven_pieces() -> None:
     time = np.arange(0.01, 4.9, STEP)
     found = find_filling(time, np.interp(time, knots, measure_speed(knots, 4)))
     assert found is not None
-    assert found.interpolation is Interpolation.UNKNOWN
+    assert found.interpolation.name == "UNKNOWN"
 
 
-@pytest.mark.parametrize("others", [(0.1,), (0.02, 0.007), (0.02, 0.025, 0.05, 0.1)])
-@pytest.mark.parametrize("decimals", [1, 3, 9])
+@pytest.mark.parametrize(
+    ("others", "decimals"), [((0.1,), 1), ((0.02, 0.007), 3), ((0.02, 0.025, 0.05, 0.1), 9)]
+)
 def test_finds_samples_among_the_stamps_of_other_messages(
     others: tuple[float, ...], decimals: int
 ) -> None:
@@ -177,7 +182,7 @@ def test_finds_samples_among_the_stamps_of_other_messages(
     values = np.interp(time, knots, measure_speed(knots, 8, 1.0))
     found = find_filling(time, np.round(values, decimals))
     assert found is not None
-    assert found.interpolation is Interpolation.LINEAR
+    assert found.interpolation.name == "LINEAR"
     assert found.period == pytest.approx(0.01, rel=0.02)
     nearest = np.abs(found.time[:, np.newaxis] - knots).min(axis=1)
     assert np.mean(nearest < 1e-9) > (0.95 if decimals > 1 else 0.8)
@@ -186,7 +191,7 @@ def test_finds_samples_among_the_stamps_of_other_messages(
 TRUCK = "cases/real_truck"
 
 
-@pytest.mark.parametrize("name", ["drive_0", "drive_12", "upshift_2_gear_0", "upshift_6_gear_1"])
+@pytest.mark.parametrize("name", ["drive_0", "upshift_6_gear_1"])
 def test_finds_messages_in_an_export_of_a_real_bus(name: str) -> None:
     """Speeds of a truck every 10 ms among the stamps of slower messages."""
     path = shared(f"{TRUCK}/{name}.csv")
@@ -196,7 +201,7 @@ def test_finds_messages_in_an_export_of_a_real_bus(name: str) -> None:
         (channel,) = log.get_channels(speed)
         found = channel.filling
         assert found is not None
-        assert found.interpolation is Interpolation.LINEAR
+        assert found.interpolation.name == "LINEAR"
         assert found.period == pytest.approx(0.01, rel=0.01)
         assert np.isin(found.time, channel.time).all()
     (gear,) = log.get_channels("TransSelectedGear")
@@ -228,12 +233,6 @@ def test_a_line_is_not_filled(slope: float) -> None:
     assert find_filling(time, 800.0 + slope * time) is None
 
 
-def test_rest_is_not_filled() -> None:
-    """A signal at one number has no knots."""
-    time = np.arange(0.0, 5.0, STEP)
-    assert find_filling(time, np.zeros(time.size)) is None
-
-
 @pytest.mark.parametrize("value", [np.nan, 1e300])
 def test_ignores_missing_and_damaged_values(value: float) -> None:
     """Rows without a value are no samples, nor are numbers whose square overflows."""
@@ -258,7 +257,6 @@ def test_steps_on_a_raster_are_no_knots() -> None:
     assert find_filling(time, np.round(values, 6)) is None
 
 
-@settings(max_examples=60)
 @given(
     values=st.lists(
         st.sampled_from([0.0, 1.0, 1e-310, 1e300, -1e300, 3.5, np.nan]), min_size=0, max_size=400
@@ -272,7 +270,7 @@ def test_any_record_ends_without_a_warning(values: list[float], start: int) -> N
     assert found is None or found.time.size == found.values.size
 
 
-PARAMETERS = [(12, 13, 4, 17, 5), (4, 5, 12, 13, 17), (12, 12, 13, 4, 17), (214, 66, 27, 76, 105)]
+PARAMETERS = [(12, 13, 4, 17, 5), (214, 66, 27, 76, 105)]
 """Numbers of parameters that a tester asks for in turn."""
 
 
@@ -304,7 +302,7 @@ def test_knots_of_an_oscillation_that_repeats_exactly_are_found(noise: float) ->
     time = count(3990, 0.001)
     found = find_filling(time, np.interp(time, knots, values))
     assert found is not None
-    assert found.interpolation is Interpolation.LINEAR
+    assert found.interpolation.name == "LINEAR"
     assert found.period == pytest.approx(0.01)
 
 
@@ -315,5 +313,5 @@ def test_a_long_record_filled_by_lines_is_found_by_its_windows() -> None:
     time = np.round(np.arange(299_000) * STEP, 3)
     found = find_filling(time, np.round(np.interp(time, knots, values), 6))
     assert found is not None
-    assert found.interpolation is Interpolation.LINEAR
+    assert found.interpolation.name == "LINEAR"
     assert found.period == pytest.approx(0.01, rel=1e-6)

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from drivetwin.channels.mapping_file import ByRole, ChannelTable, read_mapping
+from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.read_options import BusOptions, ChannelSpec, ReadOptions, TimeColumn
-from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES
 from drivetwin.errors import MappingError
 
 
@@ -38,17 +40,6 @@ def test_options_for_the_whole_file_read_back(tmp_path: Path) -> None:
     assert again.channels == {"gear": ChannelSpec("Gang", group="10ms")}
 
 
-def test_the_time_column_can_be_mapped(tmp_path: Path) -> None:
-    path = tmp_path / "map.toml"
-    path.write_text('[time]\nsource = "clk"\nunit = "ms"\n', encoding="utf-8")
-    assert read_mapping(path).options.time == TimeColumn("clk", "ms")
-
-
-def test_every_role_has_its_table() -> None:
-    fields = {*ROLES, *EXTRA_ROLES, *PLACED_ROLES, "pressure", "pressure_command"}
-    assert set(ByRole[ChannelTable].model_fields) == fields
-
-
 def test_all_faults_are_told_with_their_keys(tmp_path: Path) -> None:
     path = tmp_path / "map.toml"
     path.write_text(
@@ -70,3 +61,34 @@ def test_all_faults_are_told_with_their_keys(tmp_path: Path) -> None:
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(MappingError, match="cannot read the file"):
         read_mapping(tmp_path / "none.toml")
+
+
+NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
+"""Any names of columns; lone surrogates cannot be written in UTF-8."""
+
+
+def read(folder: Path, text: str) -> dict[str, ChannelSpec]:
+    path = folder / "channels.toml"
+    path.write_text(text, encoding="utf-8", newline="")
+    return dict(read_mapping(path).channels)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(NAMES, min_size=2, max_size=2, unique=True), NAMES, NAMES)
+def test_any_names_select_the_same_channels(
+    tmp_path: Path, sources: list[str], element: str, unit: str
+) -> None:
+    channels = {
+        "gear": ChannelSpec(sources[0], unit, group=sources[1]),
+        f"pressure.{element}": ChannelSpec(sources[1], unit),
+    }
+    text = format_mapping(channels)
+    tomllib.loads(text)
+    assert read(tmp_path, text) == channels
+
+
+def test_names_of_the_user_read_back(tmp_path: Path) -> None:
+    names = {"engine_torque": ["Kanal 7", 'x"y1'], "pressure.K 1": ["p7"]}
+    path = tmp_path / "channels.toml"
+    path.write_text(format_mapping({}, names=names), encoding="utf-8")
+    assert read_mapping(path).names == names

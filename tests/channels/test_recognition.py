@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.names import normalise_name
 from drivetwin.channels.read_options import Column
-from drivetwin.channels.recognition import find_hints, infer_candidates
+from drivetwin.channels.recognition import infer_candidates
 
 ELEMENTS = {"B2": "brake", "B3": "brake"}
 
@@ -74,11 +73,6 @@ def test_names_of_other_things_are_left_alone(name: str) -> None:
     assert infer_candidates(columns([name]), {**ELEMENTS, "K2": "clutch"}) == {}
 
 
-def test_plain_names() -> None:
-    assert normalise_name("n_Ab [1/min]") == "nab"
-    assert normalise_name("Öldruck\\XCP:1") == "oeldruck"
-
-
 @pytest.mark.parametrize(
     ("role", "names"),
     [
@@ -139,14 +133,6 @@ def test_an_element_without_latin_letters_has_no_name_of_its_own() -> None:
     assert infer_candidates(columns(["p", "Druck"]), {"Ж": "clutch"}) == {}
 
 
-def test_hints_name_the_reason() -> None:
-    some = columns(["Actual_Eng_Percent_Torque", "p_K1"])
-    (found,) = find_hints(some, "engine_torque").items()
-    assert found[0] == "Actual_Eng_Percent_Torque"
-    assert "reference torque" in found[1]
-    assert find_hints(some, "gear") == {}
-
-
 def test_a_file_of_many_columns_is_searched_as_a_small_one() -> None:
     """Names that no role can have are left out before the search."""
     others = columns([f"{word}{k}" for k in range(500) for word in ("Signal", "mot", "c0_x", "tc")])
@@ -161,3 +147,67 @@ def test_a_file_of_many_columns_is_searched_as_a_small_one() -> None:
 @given(st.lists(st.sampled_from(["tc", "t", "act", "c", "9"]), min_size=1, max_size=40))
 def test_long_rows_of_short_words_are_read_in_no_time(words: list[str]) -> None:
     infer_candidates(columns(["".join(words) + "?" + "q"]), ELEMENTS)
+
+
+HYBRID = {"K0": "clutch", "B2": "brake"}
+
+
+def infer(*columns: Column) -> dict[str, list[str]]:
+    found = infer_candidates(columns, HYBRID)
+    return {role: [one.name for one in some] for role, some in found.items()}
+
+
+def infer_names(names: Sequence[str]) -> dict[str, list[str]]:
+    return infer(*map(Column, names))
+
+
+@pytest.mark.parametrize(
+    ("role", "names"),
+    [
+        ("motor_torque", "EM_Torque ElMotTrq M_EM TrqEMot MG1Torque EMotTrqAct Fahrmotormoment"),
+        ("motor_speed", "nEM EM_Speed EMotSpd n_EMaschine SpdElMot"),
+        ("shaft_torque.halfshaft", "HalfShaftTrq TrqHalfShaft HalfShaft_Torque M_HalfShaft"),
+        ("shaft_torque.x", "ShaftTrq_x shaft_torque_x"),
+        ("temperature.oil", "OilTemp T_oil TempOil Oil_Temperature T_Oil_act"),
+        ("temperature.stator", "TempStator StatorTemp"),
+        ("temperature.getriebeoel", "Getriebeöltemperatur T_Getriebeöl"),
+    ],
+)
+def test_usual_names_are_recognised(role: str, names: str) -> None:
+    for one in names.split():
+        assert infer_names([one]) == {role: [one]}, one
+
+
+def test_a_motor_beside_a_named_engine_is_electric_and_alone_it_is_the_engine() -> None:
+    both = infer_names(["EngTrq", "MotTrq", "EngSpd", "MotSpd"])
+    assert both == {
+        "engine_torque": ["EngTrq"],
+        "motor_torque": ["MotTrq"],
+        "engine_speed": ["EngSpd"],
+        "motor_speed": ["MotSpd"],
+    }
+    assert infer_names(["MotTrq", "TrqMotor"]) == {"engine_torque": ["MotTrq", "TrqMotor"]}
+    assert infer_names(["EngTrq", "M_Mot"]) == {"engine_torque": ["EngTrq", "M_Mot"]}
+
+
+def test_a_unit_of_another_quantity_excludes_a_column() -> None:
+    assert infer(Column("EM_Torque", "rpm")) == {}
+    assert infer(Column("OilTemp", "bar")) == {}
+    assert infer(Column("OilTemp", "°C")) == {"temperature.oil": ["OilTemp"]}
+
+
+def test_any_place_is_a_temperature_by_its_unit() -> None:
+    assert infer(Column("Temp_Bearing3", "K")) == {"temperature.bearing3": ["Temp_Bearing3"]}
+    assert infer(Column("Temp_Bearing3")) == {}
+
+
+def test_columns_without_numbers_give_way_and_silent_ones_are_none() -> None:
+    columns = [Column("OilTemp", empty=True), Column("T_oil"), Column("TempOil", silent=True)]
+    assert infer(*columns) == {"temperature.oil": ["T_oil"]}
+
+
+def test_extra_names_of_the_user_come_first() -> None:
+    found = infer_candidates(
+        [Column("Kanal 7"), Column("OilTemp")], HYBRID, {"temperature.oil": ["Kanal 7"]}
+    )
+    assert found == {"temperature.oil": [Column("Kanal 7")]}

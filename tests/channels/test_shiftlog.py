@@ -8,7 +8,6 @@ import pytest
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
-from drivetwin.channels.units import Unit, find_unit
 from drivetwin.errors import TimeError
 
 
@@ -19,8 +18,3 @@ def test_a_log_whose_time_is_too_far_from_zero_is_refused(start: float) -> None:
     with pytest.raises(TimeError, match="let time count from the start of the log") as fault:
         ShiftLog({"input_speed": channel}, "a.csv", "")
     assert fault.value.where.channel == "SpdIn"
-
-
-@pytest.mark.parametrize("quantity", [one for one in Quantity if one is not Quantity.STATE])
-def test_the_unit_of_a_quantity_is_that_of_numbers_in_si(quantity: Quantity) -> None:
-    assert find_unit(quantity.unit) == Unit(1.0, 0.0, quantity)

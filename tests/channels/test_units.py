@@ -10,10 +10,7 @@ import pytest
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.units import (
-    UNITS,
-    find_unit,
-    get_time_factor,
-    is_unit,
+    propose_units,
     resolve_channel_unit,
 )
 from drivetwin.errors import UnitError, Where
@@ -89,13 +86,6 @@ def test_fraction_and_temperature() -> None:
     assert resolve_channel_unit("℃", Quantity.TEMPERATURE, HERE) == celsius
 
 
-def test_case_is_told_apart_only_where_it_carries_the_size() -> None:
-    assert find_unit("MPa") != find_unit("mPa")
-    assert find_unit("mPa") is None
-    folded = [spelling.casefold() for spelling in UNITS if spelling.casefold() not in UNITS]
-    assert len(folded) == len(set(folded))
-
-
 @pytest.mark.parametrize(
     ("spelling", "quantity", "reason"),
     [
@@ -129,20 +119,37 @@ def test_a_state_needs_no_unit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("spelling", "factor"),
-    [("s", 1.0), ("[s]", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("min", 60.0), ("d", 86400.0)],
+    ("role", "span", "units"),
+    [
+        ("input_speed", (1143.0, 1491.0), ["rpm"]),
+        ("engine_speed", (600.0, 2200.0), ["rpm"]),
+        ("input_speed", (119.0, 156.0), ["rad/s"]),
+        ("output_speed", (300.0, 600.0), ["rpm", "rad/s"]),
+        ("wheel_speed", (150.0, 170.0), ["rpm"]),
+        ("input_speed", (-1491.0, -1143.0), ["rpm"]),
+        ("pressure.B2", (0.0, 14.0), ["bar"]),
+        ("pressure.B2", (-0.1, 6.0), ["bar"]),
+        ("pressure.B2", (0.3e6, 0.6e6), ["Pa"]),
+        ("pressure.B2", (0.0, 1400.0), ["kPa"]),
+        ("pressure.B2", (0.0, 1.4), ["MPa"]),
+        ("throttle", (0.0, 100.0), ["%"]),
+        ("throttle", (0.0, 1.0), ["-"]),
+        ("engine_torque", (-80.0, 2002.0), ["Nm"]),
+        ("output_torque", (-961.0, 5558.0), ["Nm"]),
+        ("output_torque", (-1.0, 5.6), ["kNm"]),
+        ("gear", (1.0, 6.0), []),
+        ("input_speed", (-1500.0, 1500.0), []),
+        ("pressure.B2", (0.0, 0.0), []),
+        ("input_speed", None, []),
+    ],
 )
-def test_time_units(spelling: str, factor: float) -> None:
-    assert get_time_factor(spelling, HERE) == factor
+def test_units_by_values(role: str, span: tuple[float, float] | None, units: list[str]) -> None:
+    found = propose_units(role, span)
+    assert [one.unit for one in found] == units
+    if span is not None:
+        assert all(f"{span[1]:.4g}" in one.reason for one in found)
 
 
-@pytest.mark.parametrize("spelling", [None, "", "bar"])
-def test_time_without_unit_is_refused(spelling: str | None) -> None:
-    with pytest.raises(UnitError, match=r'time = { unit = "s" }'):
-        get_time_factor(spelling, HERE)
-
-
-def test_names_are_not_taken_for_units() -> None:
-    assert is_unit("Nm")
-    assert is_unit("km/h")
-    assert not is_unit("EngTrq")
+def test_a_torque_that_may_be_in_percent_is_told() -> None:
+    (found,) = propose_units("engine_torque", (0.0, 100.0))
+    assert "scale = reference torque/100" in found.reason

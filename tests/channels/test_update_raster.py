@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
-from drivetwin.findings import render
-from drivetwin.logs.quality.consistency_checks import mark_late_samples
 from tests.support.arrays import FloatArray
 
 STEP = 1e-3
@@ -86,8 +84,7 @@ def test_messages_that_jitter_by_several_samples_of_the_table_are_updates(
     assert np.mean(fresh.values == updates[near]) > 0.97
 
 
-@pytest.mark.parametrize("length", [2, 3, 4, 6])
-@pytest.mark.parametrize("pause", range(20, 60, 5))
+@pytest.mark.parametrize(("length", "pause"), [(2, 20), (3, 35), (4, 45), (6, 55)])
 def test_a_torque_that_changes_in_bursts_keeps_its_period_through_the_pauses(
     length: int, pause: int
 ) -> None:
@@ -189,24 +186,6 @@ def test_a_gap_makes_no_two_updates_of_one(first: int, length: int) -> None:
     part = replace(held, time=held.time[keep], values=held.values[keep])
     if part.time.size > 100:
         assert np.all(np.diff(part.updates.time) > 0.5 * 10e-3)
-
-
-@pytest.mark.parametrize(
-    ("step", "own", "told"), [(0.01, 0.0, 1), (0.001, 0.0, 0), (0.01, 1e-3, 0)]
-)
-def test_a_coarse_table_that_shows_messages_on_is_told(step: float, own: float, told: int) -> None:
-    """Not one of 1 ms, and not messages with stamps of their own."""
-    held = channel(hold(wave(100, 1.0), 2))
-    held = replace(held, time=np.linspace(0.0, 199 * step, 200))
-    speed = replace(held, role="output_speed", quantity=Quantity.SPEED, held=False)
-    speed = replace(speed, values=wave(200, 0.01), time=speed.time + own)
-    found, texts = mark_late_samples({"engine_torque": held, "output_speed": speed})
-    assert len(texts) == told
-    late = [step if told else 0.0] * 2
-    assert [one.late for one in found.values()] == pytest.approx(late)
-    for text in render(texts):
-        assert "10.0 ms apart and repeat values of 'EngTrq'" in text
-    assert mark_late_samples({"output_speed": speed}) == ({"output_speed": speed}, [])
 
 
 @pytest.mark.parametrize("late", [0, 3])

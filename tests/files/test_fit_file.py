@@ -4,18 +4,19 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
-from drivetwin.files.fit_file import FitFile, build_fit_file
+from drivetwin.files.fit_file import build_fit_file
 from drivetwin.findings import Code, report
 from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
 from tests.support.fits import fit_log, make_log
 
 
-def build() -> FitFile:
+def build() -> Any:
     found = fit_log(ModelName.ENGINE_START)
     held = predict(found, [make_log(ModelName.ENGINE_START, 1).recording])
     remarks = (report(Code.RECORDING, text="a remark"),)
@@ -46,13 +47,13 @@ def test_the_file_has_the_numbers_of_the_fit() -> None:
 def test_the_text_reads_back_equal_and_is_the_same_each_time() -> None:
     text = build().to_json()
     assert text == build().to_json()
-    assert FitFile.model_validate_json(text) == build()
+    assert type(build()).model_validate_json(text) == build()
     assert "NaN" not in text
 
 
 def test_a_wrong_key_or_type_is_refused() -> None:
     content = json.loads(build().to_json())
     with pytest.raises(ValidationError, match="nonsense"):
-        FitFile.model_validate({**content, "nonsense": 1})
+        type(build()).model_validate({**content, "nonsense": 1})
     with pytest.raises(ValidationError, match="chi2"):
-        FitFile.model_validate({**content, "chi2": "small"})
+        type(build()).model_validate({**content, "chi2": "small"})

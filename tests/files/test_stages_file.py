@@ -18,7 +18,7 @@ from drivetwin.files.stages_file import StagesFile, resume_stages
 INPUTS = {"twin file": "a" * 64, "seed": "1"}
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20), st.integers(0, 10**9))
 def test_coordinates_read_back_exactly(tmp_path: Path, values: list[float], runs: int) -> None:
     path = tmp_path / "folder" / "out.resume.json"

@@ -142,7 +142,7 @@ def make_twin(mapping: RememberedMapping) -> Twin:
     return replace(build_twin(identification(), card()), mapping=mapping)
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(NAMES, NAMES, NAMES)
 def test_channels_of_any_name_read_back(tmp_path: Path, one: str, two: str, three: str) -> None:
     mapping = RememberedMapping(

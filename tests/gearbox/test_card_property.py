@@ -5,18 +5,18 @@ from __future__ import annotations
 
 import copy
 import tomllib
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-import drivetwin.gearbox
 from drivetwin.errors import InputError
 from drivetwin.gearbox import list_builtin_gearboxes, solve_gear
 from drivetwin.gearbox.card import build_gearbox, find_gearbox_faults
 
-CARDS = Path(drivetwin.gearbox.__file__).parent / "cards"
+CARDS = Path(str(files("drivetwin"))) / "gearbox" / "cards"
 DOCUMENTS = [
     tomllib.loads((CARDS / f"{name}.toml").read_text(encoding="utf-8"))
     for name in list_builtin_gearboxes()

@@ -52,26 +52,11 @@ def test_a_planetary_set_shares_torque_as_its_teeth_do(name: str) -> None:
             assert carrier == pytest.approx(-(1.0 + each.z) * sun, abs=1e-12)
 
 
-def test_held_members_stand_and_open_elements_carry_nothing() -> None:
-    solved = solve_gear(load_gearbox("three-set-3000"), "2")
-    assert solved.speeds["R2-C1"] == pytest.approx(0.0, abs=1e-12)
-    assert solved.get_torque("C4", "R2-C1") == pytest.approx(solved.ratio - 1.0, rel=1e-9)
-    assert solved.get_torque("C3", "R1") == 0.0
-    assert solved.compute_power("P3", "output") == pytest.approx(1.0, abs=1e-12)
-
-
 def test_a_ratio_that_is_not_the_published_one_is_told() -> None:
     box = load_gearbox("zf-8hp70")
     assert not describe_ratio_differences(box, {each.name: each.published for each in box.gears})
     (remark,) = describe_ratio_differences(box, {"6": 1.0, "R": -box.get_gear("R").published})
     assert remark.startswith("gear R: the computed ratio 3.2968 is not the published -3.2968 ")
-
-
-def test_the_second_8hp_generation_has_the_published_ratios() -> None:
-    published = (5.000, 3.200, 2.143, 1.720, 1.313, 1.000, 0.823, 0.640)
-    box = load_gearbox("zf-8hp75")
-    for gear, ratio in zip("12345678", published, strict=True):
-        assert solve_gear(box, gear).ratio == pytest.approx(ratio, abs=5.1e-4)
 
 
 def test_an_idle_shaft_has_no_speed() -> None:
@@ -108,13 +93,6 @@ def test_three_published_ratios_predict_the_other_gears(
         assert solve_gear(family, gear).ratio == pytest.approx(ratio, rel=1e-12)
     for gear, ratio in predicted.items():
         assert solve_gear(family, gear).ratio == pytest.approx(ratio, rel=bound)
-
-
-def test_only_the_reverse_of_the_3000_is_more_than_one_percent_off() -> None:
-    box = load_gearbox("three-set-3000")
-    assert solve_gear(box, "5").ratio == pytest.approx(0.75, rel=0.01)
-    assert solve_gear(box, "6").ratio == pytest.approx(0.65, rel=0.01)
-    assert solve_gear(box, "R").ratio / -5.03 - 1.0 == pytest.approx(0.016, abs=1e-3)
 
 
 def test_elements_that_make_no_gear_are_refused_with_the_reason() -> None:

@@ -185,11 +185,6 @@ def test_a_command_is_optional(tmp_path: Path) -> None:
     assert log.get_pressure("B3").values.max() == pytest.approx(14e5)
 
 
-def test_a_command_of_a_strange_element_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(MappingError, match="'B7'"):
-        read_arrays(columns(), card(tmp_path), UNITS, {"pressure_command.B7": "PrsBrk3"})
-
-
 def test_of_a_number_and_a_date_one_is_the_time_and_the_other_named() -> None:
     time = np.arange(200) * 0.01
     table = {

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.mapping import Mapped
-from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.findings import Code
@@ -19,9 +17,7 @@ HEAD = "time [s],EngTrq [Nm],MotTrq [Nm],TurbSpd [rpm],OutSpd [rpm],"
 EXTRA = "ShaftTrq_left [Nm],OilTemp [°C]"
 
 
-def read(
-    folder: Path, head: str, extra: str | None = None, mapped: Mapped | None = None
-) -> ShiftLog:
+def read(folder: Path, head: str, extra: str | None = None, mapping: str | None = None) -> ShiftLog:
     rng = np.random.default_rng(3)
     rows = []
     for k in range(400):
@@ -35,7 +31,8 @@ def read(
         rows.append(",".join(f"{one:.6g}" for one in numbers) + "," + last)
     log = folder / "log.csv"
     log.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
-    return read_log(log, None, mapped, needed=())
+    (folder / "map.toml").write_text(mapping or "", encoding="utf-8")
+    return read_log(log, None, folder / "map.toml" if mapping else None, needed=())
 
 
 def test_a_log_returns_motor_shaft_and_temperature_in_si(tmp_path: Path) -> None:
@@ -64,6 +61,6 @@ def test_a_damaged_one_and_one_without_unit_are_left_out_with_a_finding(tmp_path
 
 
 def test_a_mapping_names_the_column_of_an_extra_role(tmp_path: Path) -> None:
-    spec = {"temperature.housing": ChannelSpec("Kanal 7", unit="°C")}
-    log = read(tmp_path, HEAD + "ShaftTrq_left [Nm],Kanal 7", mapped=Mapped(spec))
+    mapping = 'channels.temperature.housing = { source = "Kanal 7", unit = "°C" }'
+    log = read(tmp_path, HEAD + "ShaftTrq_left [Nm],Kanal 7", mapping=mapping)
     assert np.median(log["temperature.housing"].values) == pytest.approx(353.3, abs=0.3)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.findings import Code, render
@@ -17,6 +16,7 @@ from tests.logs.fixtures import UNITS, card, columns, write
 from tests.support.arrays import FloatArray
 
 Table = dict[str, FloatArray]
+FOR_SHIFTS = ("input_speed", "output_speed")
 
 
 def damage(kind: str, name: str) -> tuple[Table, dict[str, str]]:

@@ -108,7 +108,18 @@ SLIPS = (
 )
 
 
-DAILY = ("gearbox_chain", "open_converter", "paper", "power_off_down")
+DAILY = ("open_converter", "paper")
+
+
+def mark_slips() -> list[object]:
+    """Each slip by its name; half of those of gains and inertias run at night."""
+    repeats = {one.name for one in (*SLIPS[1:4], *SLIPS[6:7], *SLIPS[14:15])}
+    return [
+        pytest.param(
+            one, id=one.name, marks=[pytest.mark.exhaustive] if one.name in repeats else []
+        )
+        for one in SLIPS
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +134,7 @@ def check_file(card: Path, log: Path) -> tuple[Finding, ...]:
     return (*found, *select_card_findings(vehicle, read.findings))
 
 
-@pytest.mark.parametrize("slip", SLIPS, ids=lambda one: one.name)
+@pytest.mark.parametrize("slip", mark_slips())
 def test_slip_is_reported_with_its_entry_and_what_is_expected(
     slip: Slip, paper: Synthetic, tmp_path: Path
 ) -> None:
@@ -133,6 +144,7 @@ def test_slip_is_reported_with_its_entry_and_what_is_expected(
     card.write_text(tomlkit.dumps(document), encoding="utf-8")
     by_key = {one.place.key: one for one in check_file(card, paper.log)}
     assert slip.key in by_key
+    assert len(by_key) == 1 or slip not in SLIPS[:8]
     finding = by_key[slip.key]
     assert finding.place.file in (str(card), None)
     assert "expected" in finding.text or "card has" in finding.text or "gives" in finding.text
@@ -144,15 +156,6 @@ def test_slip_is_reported_with_its_entry_and_what_is_expected(
         else:
             expected = numbers.get("expected", numbers.get("ratio"))
             assert expected == pytest.approx(slip.right, rel=5e-3)
-
-
-def test_only_the_wrong_entry_is_reported(paper: Synthetic, tmp_path: Path) -> None:
-    for slip in SLIPS[:8]:
-        document = tomlkit.parse(paper.card.read_text(encoding="utf-8")).unwrap()
-        slip.change(document)
-        card = tmp_path / "card.toml"
-        card.write_text(tomlkit.dumps(document), encoding="utf-8")
-        assert [one.place.key for one in check_file(card, paper.log)] == [slip.key]
 
 
 @pytest.mark.parametrize("scenario", mark_repeats(CORRECT, DAILY))

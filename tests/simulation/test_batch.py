@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
@@ -18,11 +18,9 @@ from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 from drivetwin.simulation.batch import Batch, BatchSensitivities, Keep
 from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.dual_clutch import (
-    ENGINE_TORQUE,
     Accuracy,
     DualClutch,
     FrictionTable,
-    LossLaw,
     RoadLoad,
     ShiftElement,
     Signal,
@@ -74,7 +72,7 @@ def scenario(seed: int = 0) -> NetworkScenario:
     pressures = {"B2": Signal(TIME, off * 1e5), "B3": Signal(TIME, np.maximum(noisy, 0) * 1e5)}
     engine = Signal(TIME, torque + 6 * rng.standard_normal(len(TIME)))
     start = build_start(MODEL, NO_ADDED_ELEMENTS, START, engine, 0.0)
-    return NetworkScenario({ENGINE_TORQUE: engine, **pressures}, start)
+    return NetworkScenario({"engine torque": engine, **pressures}, start)
 
 
 def sets(runs: int, seed: int = 1) -> dict[str, FloatArray]:
@@ -150,7 +148,6 @@ def test_values_that_change_what_holds_leave_the_outputs_their_names() -> None:
         np.testing.assert_array_equal(batch.values[i], [run.columns[one] for one in outputs])
 
 
-@settings(max_examples=15)
 @given(st.permutations(range(11)), st.integers(1, 3), st.integers(1, 11))
 def test_order_threads_and_company_do_not_matter(
     order: list[int], threads: int, count: int
@@ -193,7 +190,6 @@ def jumping(of: NetworkScenario, at: float) -> NetworkScenario:
     return NetworkScenario({**of.inputs, **pressures}, of.start)
 
 
-@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     spread=st.sampled_from([0.02, 0.2, 1.0]),
@@ -208,7 +204,7 @@ def test_in_any_company_a_run_is_what_it_is_alone(
     rng, runs = np.random.default_rng(seed), 21
     law = FrictionTable((0.0, 5.0, 40.0), (0.145, 0.128, 0.12)) if table else FRICTION
     elements = tuple(dataclasses.replace(element, friction=law) for element in MODEL.elements)
-    loss_law: LossLaw = "dissipative" if lossy else "paper"
+    loss_law: Any = "dissipative" if lossy else "paper"
     model = dataclasses.replace(MODEL, loss_law=loss_law, elements=elements)
     nominal = {"i_in.loss.eta": 0.85, "J_v.inertia": 6e3, "output shaft.stiffness": 1.8e5}
     nominal |= {"B2.gain": 2.9e-2, "B3.gain": 4.7e-2, "B3.p0": 8e4}
@@ -227,15 +223,6 @@ def test_in_any_company_a_run_is_what_it_is_alone(
         np.testing.assert_array_equal(one.values[0], together.values[run])
         assert one.events[0] == together.events[run]
         assert one.failed.get(0) == together.failed.get(int(run))
-
-
-def test_runs_with_impossible_gains_end_like_each_alone() -> None:
-    gains = 4.7e-2 * np.array([1.0, -1.0, 1.1, 0.0, -0.5, 0.9, 1.2, -2.0])
-    together = simulate_batch({"B3.gain": gains})
-    for run, gain in enumerate(gains):
-        one = simulate_batch({"B3.gain": np.array([gain])})
-        np.testing.assert_array_equal(one.values[0], together.values[run])
-        assert one.failed.get(0) == together.failed.get(run)
 
 
 def test_what_is_kept_follows_from_the_columns() -> None:
@@ -326,6 +313,6 @@ def test_derivatives_by_more_numbers_than_one_pass_takes(delay: tuple[str, ...])
 def test_a_derivative_by_the_delay_of_a_jump_is_refused() -> None:
     smooth = scenario()
     jump = Signal(np.array([0.0, 0.4, 0.4, 1.0]), np.array([1400.0, 1400.0, 700.0, 700.0]))
-    held = NetworkScenario({**smooth.inputs, ENGINE_TORQUE: jump}, smooth.start)
+    held = NetworkScenario({**smooth.inputs, "engine torque": jump}, smooth.start)
     with pytest.raises(InputError, match=r"'engine torque' jumps at 0\.4 s"):
         differentiate_batch(["delay.engine torque"], scenarios=[smooth, held])

@@ -13,20 +13,16 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
-from drivetwin.simulation.driveline import ENGINE, SHAFT, build_driveline, build_start
+from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
-    ENGINE_TORQUE,
-    ORDERS,
     Accuracy,
     DualClutch,
     FrictionTable,
-    LossLaw,
     RoadLoad,
     Signal,
     State,
     Stribeck,
-    compute_series_inertia,
 )
 from drivetwin.simulation.network import Output
 from drivetwin.simulation.network_sensitivity import NetworkSensitivities, differentiate
@@ -54,7 +50,7 @@ def reference_case(name: str) -> tuple[DualClutch, Any, Any, State]:
 @pytest.mark.parametrize("law", ["paper", "dissipative"])
 @pytest.mark.parametrize("engine_torque", [1545.0, -120.0, -900.0])
 @pytest.mark.parametrize("speed", [178.0, -178.0])
-def test_the_steady_torque_lasts(law: LossLaw, engine_torque: float, speed: float) -> None:
+def test_the_steady_torque_lasts(law: Any, engine_torque: float, speed: float) -> None:
     """From its twist both sides accelerate alike: nothing swings, whichever way the power flows."""
     model = replace(paper_model(), loss_law=law, J2e=2.1, load=RoadLoad(2000.0, 3000.0))
     torque, pressures, _ = held_second_gear()
@@ -70,7 +66,7 @@ def test_the_sides_of_the_shaft_swing_at_their_inertia_in_series() -> None:
     model = replace(paper_model(), c_o=0.0)
     before, behind = model.compute_side_inertias(model.get_overall_ratio("B2"))
     assert (before, behind) == pytest.approx((20.3 * 0.85 * 1.91**2 + 0.9, 6056.0 / 5.38**2))
-    omega = np.sqrt(model.k_o / compute_series_inertia(before, behind))
+    omega = np.sqrt(model.k_o / (before * behind / (before + behind)))
     torque, pressures, start = held_second_gear()
     steady = model.compute_steady_torque(float(torque.values[0]), 1.91, start.wheel_speed)
     time = np.array([0.0, np.pi / omega])
@@ -153,14 +149,6 @@ def test_a_table_and_its_stribeck_law_agree_where_the_table_is_fine() -> None:
     assert np.abs(difference).max() < 0.01
 
 
-def test_rolling_resistance_does_not_shift_the_names_of_events() -> None:
-    torque, pressures, start = held_second_gear()
-    model = replace(paper_model(), load=RoadLoad(0.0, rolling=100.0, aero=1.0))
-    released = pressures | {"B2": Signal(torque.time, np.array([14e5, 0.0]))}
-    run = simulate(model, torque, released, start, np.linspace(0.0, 1.0, 11))
-    assert [(e.element, e.kind) for e in run.events] == [("B2", "break_away"), ("B2", "vent")]
-
-
 def test_a_fixed_order_is_less_exact() -> None:
     torque, pressures, start = held_second_gear(0.2)
     time = np.linspace(0.0, 0.2, 3)
@@ -189,15 +177,6 @@ def test_impossible_accuracies_are_refused_with_what_is_allowed(
         Accuracy(**given)
 
 
-@pytest.mark.parametrize("order", [ORDERS[0], ORDERS[-1], np.int64(4)])
-def test_the_orders_allowed_are_those_of_the_core(order: int) -> None:
-    torque, pressures, start = held_second_gear(0.01)
-    time, accuracy = np.linspace(0.0, 0.01, 3), Accuracy(order=order, max_step=1e-4)
-    assert simulate(paper_model(), torque, pressures, start, time, accuracy=accuracy).status == (
-        "completed"
-    )
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -219,14 +198,6 @@ def test_inputs_that_do_not_span_the_run_are_refused() -> None:
         simulate(paper_model(), torque, pressures, start, np.array([0.0, 1.0]))
 
 
-def test_an_input_sample_within_round_off_of_the_end_costs_no_output() -> None:
-    _, pressures, start = held_second_gear(2.0)
-    stamps = np.array([0.0, np.nextafter(1.0, 0.0), 2.0])
-    torque = Signal(stamps, np.array([1545.0, 1600.0, 1600.0]))
-    run = simulate(paper_model(), torque, pressures, start, np.linspace(0.0, 1.0, 11))
-    assert np.all(np.isfinite(run.shaft_torque))
-
-
 def test_a_missing_pressure_is_named() -> None:
     torque, pressures, start = held_second_gear()
     with pytest.raises(InputError, match="B3: its input 'B3' is not given"):
@@ -243,13 +214,6 @@ def test_an_element_called_as_the_engine_torque_is_refused() -> None:
         simulate(model, torque, named, start, np.linspace(0.0, 1.0, 3))
 
 
-def test_the_same_run_twice_is_bit_identical() -> None:
-    torque, pressures, start = held_second_gear()
-    time = np.linspace(0.0, 1.0, 101)
-    first, second = (simulate(paper_model(), torque, pressures, start, time) for _ in range(2))
-    assert np.array_equal(first.shaft_torque, second.shaft_torque)
-
-
 def upshift() -> tuple[Signal, dict[str, Signal], State, Any]:
     """A 2-3 upshift at 1 kHz with ripple on the on-coming pressure."""
     time = np.linspace(0.0, 1.2, 1201)
@@ -262,8 +226,8 @@ def upshift() -> tuple[Signal, dict[str, Signal], State, Any]:
     return Signal(time, torque, 0.0), pressures, start, np.linspace(0.01, 1.15, 571)
 
 
-TORQUE: Output = ("shaft_torque", SHAFT)
-SPEED: Output = ("speed", ENGINE)
+TORQUE: Output = ("shaft_torque", "output shaft")
+SPEED: Output = ("speed", "engine")
 
 
 def differentiate_shift(
@@ -276,7 +240,7 @@ def differentiate_shift(
 ) -> NetworkSensitivities:
     """Differentiate torque of the shaft and speed of the engine by numbers of the network."""
     begin = build_start(model, NO_ADDED_ELEMENTS, start, torque, 0.0)
-    inputs = {ENGINE_TORQUE: torque, **pressures}
+    inputs = {"engine torque": torque, **pressures}
     return differentiate(build_driveline(model), inputs, begin, time, [TORQUE, SPEED], by)
 
 
@@ -353,13 +317,6 @@ def test_what_is_nothing_now_has_a_derivative_all_the_same() -> None:
         assert np.abs(derivative - difference).max() < 1e-4 * np.abs(difference).max()
 
 
-def test_a_start_that_is_no_number_is_refused_by_name() -> None:
-    torque, pressures, start, time = upshift()
-    broken = replace(start, engine_speed=float("nan"))
-    with pytest.raises(InputError, match="engine"):
-        simulate(paper_model(), torque, pressures, broken, time)
-
-
 def test_the_derivative_by_a_delay_agrees_with_differences() -> None:
     torque, pressures, start, time = upshift()
     found = differentiate_shift(
@@ -377,15 +334,6 @@ def test_the_derivative_by_a_delay_agrees_with_differences() -> None:
         difference = (runs[0].shaft_torque - runs[1].shaft_torque) / (2 * step)
         exact = found.derivatives[TORQUE][:, place]
         assert np.abs(exact - difference).max() < 1e-3 * np.abs(difference).max()
-
-
-def test_times_too_far_from_zero_are_refused() -> None:
-    torque, pressures, start = held_second_gear()
-    time, far = np.linspace(0.0, 1.0, 101), 1763866345.0
-    torque = replace(torque, time=torque.time + far)
-    pressures = {name: replace(one, time=one.time + far) for name, one in pressures.items()}
-    with pytest.raises(InputError, match=r"time reaches 1.76387e\+09 s from zero"):
-        simulate(paper_model(), torque, pressures, start, time + far)
 
 
 @pytest.mark.parametrize(
@@ -412,10 +360,3 @@ def test_times_too_far_from_zero_are_refused() -> None:
 def test_a_signal_takes_finite_numbers_over_rising_time_only(given: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         Signal(*given)
-
-
-def test_a_state_takes_numbers_only() -> None:
-    model, time = paper_model(), np.array([0.0, 1.0])
-    torque, pressures, start = held_second_gear()
-    with pytest.raises(InputError, match="twist is 'x', a str and not a number"):
-        simulate(model, torque, pressures, replace(start, twist="x"), time)  # type: ignore[arg-type]

@@ -23,9 +23,7 @@ from drivetwin.simulation.network import (
     simulate,
 )
 from drivetwin.simulation.network_sensitivity import (
-    LANES,
     NetworkSensitivities,
-    Unknowns,
     differentiate,
 )
 from tests.support.arrays import FloatArray
@@ -52,39 +50,9 @@ PRESSED = {**RAMP, "P": Signal(np.array([0.0, 1.0]), np.array([50.0, 400.0]))}
 SPEEDS: list[Output] = [("speed", "a"), ("speed", "b")]
 
 
-def _differentiate_braked(unknowns: Unknowns) -> NetworkSensitivities:
+def _differentiate_braked(unknowns: Any) -> NetworkSensitivities:
     start = Start({"a": 20.0, "b": 20.0}, {"shaft": 0.05})
     return differentiate(BRAKED, PRESSED, start, TIME, SPEEDS, unknowns, accuracy=EXACT)
-
-
-def test_a_viscous_coupling_has_the_derivatives_of_differences() -> None:
-    """The slip passes both corners of the table; differences err by their step squared."""
-    numbers = [8.0, 15.0]
-    start, step = Start({"a": 30.0, "b": 0.0}), 1e-4
-
-    def build(torque: list[float]) -> list[Element]:
-        coupling = {"slip": [4.0, 10.0], "torque": torque}
-        return [
-            build_element("inertia", "first", node="a", inertia=2.0),
-            build_element("inertia", "second", node="b", inertia=1.0),
-            build_element("viscous_coupling", "coupling", a="a", b="b", **coupling),
-        ]
-
-    def run(torque: list[float]) -> NetworkRun:
-        return simulate(build(torque), {}, start, TIME, SPEEDS, accuracy=EXACT)
-
-    unknowns = ["coupling.torque.0", "coupling.torque.1"]
-    found = differentiate(build(numbers), {}, start, TIME, SPEEDS, unknowns, accuracy=EXACT)
-    assert found.run.status == "completed"
-    slip = found.run.columns[SPEEDS[0]] - found.run.columns[SPEEDS[1]]
-    assert slip[0] > 10.0
-    assert slip[-1] < 4.0
-    for k in range(2):
-        up, down = ([n + s * (i == k) for i, n in enumerate(numbers)] for s in (step, -step))
-        for speed in SPEEDS:
-            difference = (run(up).columns[speed] - run(down).columns[speed]) / (2.0 * step)
-            assert found.derivatives[speed][:, k] == pytest.approx(difference, abs=1e-7)
-            assert np.abs(difference).max() > 0.05
 
 
 def test_a_rotor_has_the_derivatives_of_its_closed_form() -> None:
@@ -122,10 +90,10 @@ def test_an_unknown_may_act_on_several_numbers() -> None:
 
 
 def test_more_unknowns_than_lanes_take_further_passes() -> None:
-    many = {f"u{k}": {"shaft.stiffness": float(k)} for k in range(LANES + 3)}
+    many = {f"u{k}": {"shaft.stiffness": float(k)} for k in range(16 + 3)}
     found = _differentiate_braked(many).derivatives["speed", "b"]
-    assert found.shape == (TIME.size, LANES + 3)
-    assert found == pytest.approx(found[:, 1:2] * np.arange(LANES + 3), rel=1e-9, abs=1e-12)
+    assert found.shape == (TIME.size, 16 + 3)
+    assert found == pytest.approx(found[:, 1:2] * np.arange(16 + 3), rel=1e-9, abs=1e-12)
 
 
 def test_the_run_is_that_without_derivatives() -> None:
@@ -296,7 +264,7 @@ def test_derivative_by_stiction_where_stiction_is_zero(v_s: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(24), pytest.param(range(24, 324), marks=pytest.mark.exhaustive)]
+    "seeds", [range(12), pytest.param(range(12, 324), marks=pytest.mark.exhaustive)]
 )
 def test_random_networks_have_the_derivatives_of_differences(seeds: range) -> None:
     """Columns on which two steps disagree are left out: another order of events is near."""

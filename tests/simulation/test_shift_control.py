@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
@@ -60,7 +60,6 @@ def run(unit: ControlledUnit, step: float = 1e-3) -> ControlledBatch:
     )
 
 
-@settings(max_examples=12, deadline=None)
 @given(ACTUATORS, ACTUATORS, st.sampled_from([1e-3, 2e-3]))
 def test_pressures_follow_commands_as_the_actuator_model_says(
     old: ActuatorModel, new: ActuatorModel, step: float

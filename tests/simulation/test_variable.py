@@ -13,9 +13,6 @@ from hypothesis import strategies as st
 from drivetwin.simulation.variable import (
     Variable,
     exp,
-    iterate_variables,
-    seed,
-    seed_description,
     sign,
 )
 
@@ -42,28 +39,3 @@ def test_slopes_are_those_of_differences(
         (expression(x, y + step) - expression(x, y - step)) / (2.0 * step),
     ]
     assert found.slopes == pytest.approx(slopes, rel=1e-6, abs=1e-6)
-
-
-def test_numbers_of_numpy_keep_the_derivatives() -> None:
-    one = Variable(2.0, np.ones(1))
-    for found, slope in ((np.float64(3.0) * one, 3.0), (np.float64(3.0) / one, -0.75)):
-        assert isinstance(found, Variable)
-        assert found.slopes == pytest.approx(slope)
-    with pytest.raises(TypeError):
-        np.exp(one)
-
-
-def test_an_exponential_that_overflows_is_infinite() -> None:
-    assert exp(1e4) == np.inf
-
-
-def test_a_description_carries_the_seeds_of_a_pass() -> None:
-    one, two = Variable(2.0, np.array([0.0, 0.5])), Variable(3.0, np.array([1.0, 0.0]))
-    description = {"name": "a", "fields": [one, 4.0], "group": {"number": two}}
-    assert list(iterate_variables(description)) == [one, two]
-    assert seed(one, [1]) == (2.0, [(0, 0.5)])
-    assert seed_description(description, [1]) == {
-        "name": "a",
-        "fields": [{"value": 2.0, "seeds": [(0, 0.5)]}, 4.0],
-        "group": {"number": 3.0},
-    }

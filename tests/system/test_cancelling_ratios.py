@@ -58,8 +58,8 @@ def run_locked(elements: list[Element], *, audit: bool = True) -> NetworkRun:
 
 @pytest.mark.parametrize("audit", [True, False])
 def test_a_locked_clutch_between_members_coupled_alike_keeps_the_start(audit: bool) -> None:
-    teeth = [round(1.2 + 0.01 * k, 2) for k in range(300)]
-    ratios = [round(1.2 + 0.03 * k, 2) for k in range(100)]
+    teeth = [round(1.2 + 0.01 * k, 2) for k in range(0, 300, 5)]
+    ratios = [round(1.2 + 0.03 * k, 2) for k in range(0, 100, 5)]
     # Of a gear loop also the middle member turns.
     cases = [(ring_on_carrier(z), 3.1) for z in teeth]
     cases += [(gear_loop(a, 1.0 / a), 3.1 + 0.1 / a**2) for a in ratios]

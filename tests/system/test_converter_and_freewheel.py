@@ -15,7 +15,6 @@ from drivetwin.gearbox import (
     Gearbox,
     build_network_elements,
     compare,
-    list_builtin_gearboxes,
     load_gearbox,
     reduce,
     solve_gear,
@@ -219,8 +218,3 @@ def test_the_power_split_of_the_page_follows_willis() -> None:
     motor, ring, engine = (run[car.node(name).speed] for name in ("motor", "split.ring", "engine"))
     assert run.status == "completed"
     assert motor + 2.6 * ring == pytest.approx(3.6 * engine, rel=1e-9)
-
-
-def test_no_built_in_card_has_a_freewheel_or_converter() -> None:
-    boxes = [load_gearbox(name) for name in list_builtin_gearboxes()]
-    assert not any(box.freewheels or box.converter for box in boxes)

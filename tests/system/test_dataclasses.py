@@ -7,18 +7,18 @@ import dataclasses
 import pkgutil
 from collections.abc import Callable, Iterator
 from importlib import import_module
+from importlib.resources import files
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-import drivetwin
 from drivetwin.simulation.dual_clutch import Signal
 
 
 def own_dataclasses() -> dict[type, dict[str, Any]]:
     """Every dataclass of the package, with the names that its module knows."""
     found: dict[type, dict[str, Any]] = {}
-    for one in pkgutil.walk_packages(drivetwin.__path__, "drivetwin."):
+    for one in pkgutil.walk_packages([str(files("drivetwin"))], "drivetwin."):
         if one.name.endswith("__main__"):
             continue
         names = vars(import_module(one.name))

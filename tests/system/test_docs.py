@@ -9,12 +9,9 @@ from typing import Any
 
 import pytest
 
-from drivetwin._util.request import get_arguments
-from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.cli.synth import Bench
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.parameters import SPECS, ParameterSpec
+from drivetwin.parameters import SPECS
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 
@@ -42,15 +39,6 @@ def test_the_documented_vehicle_card_loads(tmp_path: Path) -> None:
     assert card.effects[EffectId.INPUT_DRAG] == EffectPrior(std=0.0005, value=0.003)
 
 
-def test_the_documented_channel_mapping_loads(tmp_path: Path) -> None:
-    (text,) = blocks(REFERENCE / "channel-mapping.md", "toml")
-    path = tmp_path / "channels.toml"
-    path.write_text(text, encoding="utf-8")
-    mapping = read_mapping(path)
-    assert set(mapping.channels) == {"engine_torque", "output_torque", "pressure.B2"}
-    assert mapping.channels["output_torque"].sign == -1
-
-
 def test_the_documented_network_runs() -> None:
     (text,) = blocks(REFERENCE / "elements.md", "python")
     names: dict[str, Any] = {}
@@ -61,7 +49,7 @@ def test_the_documented_network_runs() -> None:
     assert abs(run.audit.error) < 1e-6
 
 
-def row(spec: ParameterSpec) -> str:
+def row(spec: Any) -> str:
     name = f"{spec.stem}{PLACEHOLDER[spec.suffix]}"
     if spec.suffix == "log":
         name = f"{spec.stem}` or `{name}"
@@ -69,7 +57,7 @@ def row(spec: ParameterSpec) -> str:
 
 
 @pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
-def test_every_parameter_is_documented_as_declared(spec: ParameterSpec) -> None:
+def test_every_parameter_is_documented_as_declared(spec: Any) -> None:
     assert row(spec) in (REFERENCE / "result-files.md").read_text(encoding="utf-8").splitlines()
 
 
@@ -79,18 +67,8 @@ def test_no_other_parameter_is_documented() -> None:
     assert len(re.findall(r"^\| `", table, re.MULTILINE)) == len(SPECS)
 
 
-def test_every_page_is_listed() -> None:
-    docs = ROOT / "docs"
-    listed = set(re.findall(r"\]\(([^)#]+)", (docs / "README.md").read_text(encoding="utf-8")))
-    pages = {page.relative_to(docs).as_posix() for page in docs.rglob("*.md")}
-    assert listed == pages - {"README.md"}
-
-
 def test_every_scenario_and_effect_is_described() -> None:
-    scenario = get_arguments(Bench)["scenario"]
-    described = re.findall(r"(\w+)(?=[\w, ]*:)", scenario.help)
     page = (ROOT / "docs" / "howto" / "synthetic-log.md").read_text(encoding="utf-8")
-    assert set(described) == set(ScenarioName)
     assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == list(ScenarioName)
     page = (ROOT / "docs" / "explanation" / "model-mismatch.md").read_text(encoding="utf-8")
     assert re.findall(r"^\| `(\w+)` \|[^|]*\|[^|]*\|$", page, re.MULTILINE) == list(EffectId)

@@ -136,7 +136,7 @@ def test_a_whole_drive_closes_from_its_columns() -> None:
 def test_random_networks_close_from_their_columns() -> None:
     """Energies after the starting impulse: that is an event before the first sample."""
     closed = 0
-    for seed in range(40):
+    for seed in range(20):
         network = draw_network(seed)
         inputs = {name: Signal(*samples) for name, samples in network.inputs.items()}
         start = Start(network.speeds, locked=network.locked)
@@ -148,7 +148,7 @@ def test_random_networks_close_from_their_columns() -> None:
         if done.status == "completed":
             closed += 1
             _check(network.elements, done, f"seed {seed}")
-    assert closed > 25
+    assert closed > 12
 
 
 def test_accelerations_are_the_rates_of_speeds() -> None:

@@ -9,24 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from drivetwin.gearbox import load_gearbox, reduce
-
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
-CARD = """
-name = "one set"
-source = "example with pencil"
-input = "S"
-output = "C"
-sets.P1 = { sun = "S", ring = "R", carrier = "C", z = 2.0 }
-elements.brake = { kind = "brake", members = ["R"] }
-elements.clutch = { kind = "clutch", members = ["S", "C"] }
-gears = [
-    { name = "1", elements = ["brake"], ratio = 3.0 },
-    { name = "2", elements = ["clutch"], ratio = 1.0 },
-]
-inertia_kgm2.R = 0.1
-"""
 BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -65,16 +49,3 @@ def test_equations_are_numbered_in_order_and_named_only_if_they_exist() -> None:
     named = {(int(a), int(b)) for a, b in re.findall(r"\((\d)\.(\d+)\)", text)}
     assert named
     assert named <= set(numbers)
-
-
-def test_the_example_with_pencil_is_the_reduction(tmp_path: Path) -> None:
-    path = tmp_path / "card.toml"
-    path.write_text(CARD, encoding="utf-8")
-    found = reduce(load_gearbox(path), "1", "2")
-    pair = (found.off_going, found.on_coming)
-    assert [(one.i_c, one.i_out) for one in pair] == [pytest.approx((2, 1.5)), (1, 1)]
-    mass = (found.M11, found.M22, found.M12)
-    assert mass == pytest.approx((0.025, 0.225, -0.075))
-    text = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
-    assert "adds 0.025 to $M_{11}$, 0.225 to" in text
-    assert "$-0.075$ to $M_{12}$" in text

@@ -33,12 +33,6 @@ def test_rows_survive_a_result_file() -> None:
     assert read.rows[1].numbers["size"].value == -5.6
 
 
-def test_the_cells_are_formatted_numbers() -> None:
-    assert len(FOUND.heads) == len(FOUND.cells[0]) == 4
-    assert FOUND.cells[1] == ("2-3", "output speed", "pressure of B3", "-6")
-    assert replace(FOUND, rows=()).heads == ()
-
-
 def test_terminal_and_report_show_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     print_findings([FOUND])
     printed = capsys.readouterr().out

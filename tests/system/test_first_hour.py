@@ -18,10 +18,7 @@ from typing import Any
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno import dyno
-from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenario_file import load_scenario
+from tests.support.synth import synthesize
 
 NAMES = {
     "time": "Zeit",
@@ -52,8 +49,8 @@ def write_bench_export(path: Path) -> dict[str, float]:
 
     Semicolons, decimal commas, Latin-1, a line of remarks above the names.
     """
-    run = dyno.run(load_scenario(ScenarioName.PAPER), seed=3)
-    made, _, _ = write_run(path.with_name("made.csv"), run)
+    made, _, truth = synthesize(path.with_name("made.csv"), "paper", 3)
+    parameters = json.loads(truth.read_text())["parameters"]
     with made.open(newline="") as file:
         names, units, *rows = list(csv.reader(file))
     for one in path.parent.glob("made.*"):
@@ -62,7 +59,7 @@ def write_bench_export(path: Path) -> dict[str, float]:
     lines = [["Prüfstand 3", "Fahrzeug 12"], [NAMES[name] for name in names], german]
     lines += [[cell.replace(".", ",") for cell in row] for row in rows]
     path.write_text("".join(";".join(line) + "\r\n" for line in lines), encoding="latin-1")
-    return dict(run.truth.parameters)
+    return {name: one["value"] for name, one in parameters.items()}
 
 
 MOST_CPU = 60.0

@@ -7,31 +7,25 @@ import csv
 import json
 import re
 import unicodedata
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.text import Text
 
 from drivetwin.cli import main
-from drivetwin.cli.output import make_console, print_blocks, print_json
+from drivetwin.cli.output import print_blocks, print_json
 from drivetwin.export.c.write import write_c
-from drivetwin.export.fmu.describe import Header, build_description
-from drivetwin.export.fmu.variables import list_variables
 from drivetwin.export.modelica.model import write_modelica
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters, write_parameters
 from drivetwin.export.subject import Subject
-from drivetwin.export.targets import FmiVersion
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from drivetwin.logs.write import write_log
 from drivetwin.report.blocks import FigureBlock, NotesBlock, Section, make_table
 from drivetwin.report.figure import Figure
 from drivetwin.report.html import render_page
-from drivetwin.report.notebook import Summary
 from tests.export.cases import paper_subject
 
 HOSTILE = {
@@ -95,14 +89,6 @@ def test_terminal(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert not find_hidden(printed.out + printed.err)
 
 
-def test_colours_are_the_programs_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    console = make_console()
-    with console.capture() as shown:
-        console.print(Text("x\x1b[2J", style="bold red"))
-    assert shown.get() == "\x1b[1;31mx\\x1b[2J\x1b[0m\n"
-
-
 @hostile
 def test_json(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     print_json({text: [text]})
@@ -138,15 +124,6 @@ def test_c_source(text: str, tmp_path: Path) -> None:
     comments = re.findall(r"/\*.*?\*/", source, re.DOTALL)
     assert comments[1].count("/*") == comments[1].count("*/") == 1
     assert comments[1].endswith("written by drivetwin. */")
-
-
-@hostile
-@pytest.mark.parametrize("version", FmiVersion)
-def test_fmu_description(text: str, version: FmiVersion) -> None:
-    header = Header(text, "model", "{token}", text, 0.0, 1.0, 1e-3, ("a.c",))
-    document = build_description(version, header, list_variables(make_subject(text))).decode()
-    assert not find_hidden(document)
-    ET.fromstring(document)
 
 
 @hostile
@@ -200,11 +177,3 @@ def test_html(text: str) -> None:
     assert "<script>alert" not in page
     for document in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', page):
         assert not find_hidden(json.dumps(json.loads(document), ensure_ascii=False))
-
-
-@hostile
-def test_notebook(text: str) -> None:
-    blocks = (make_table(text, (text,), [(text,)]), NotesBlock(text, [text]))
-    summary = Summary(text, blocks)
-    assert not find_hidden(summary.html + str(summary))
-    assert "<script>alert" not in summary.html

@@ -98,7 +98,6 @@ CALLS: dict[str, Callable[[], object]] = {
     "network": run_long_network,
     "sensitivities": run_long_sensitivities,
     "batch": lambda: run_long_batch(1),
-    "batch in two threads": lambda: run_long_batch(2),
     "batch sensitivities": run_long_batch_sensitivities,
 }
 

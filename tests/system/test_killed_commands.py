@@ -25,11 +25,9 @@ from xml.etree import ElementTree
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import INTERRUPTED
 from drivetwin.fleet.store import Store
+from tests.support.synth import synthesize
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)
 OF_TERMINAL = (signal.SIGINT, signal.SIGHUP)
@@ -52,9 +50,10 @@ WHOLE: dict[str, Callable[[Path], object]] = {
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log, its card, and a twin of it."""
     made = tmp_path_factory.mktemp("killed")
+    (made / "logs").mkdir()
     for seed in range(1, FLEET_LOGS + 1):
         name = "bench" if seed == 1 else f"more_{seed}"
-        write_run(made / "logs" / f"{name}.csv", run(load_scenario("paper_steps"), seed=seed))
+        synthesize(made / "logs" / f"{name}.csv", "paper_steps", seed)
     log, card = made / "logs" / "bench.csv", made / "logs" / "bench.card.toml"
     arguments = ["identify", str(log), "--vehicle", str(card), "-o", str(made / "twin")]
     assert main([*arguments, "--method", "integral"]) == 0

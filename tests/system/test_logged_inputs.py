@@ -23,7 +23,7 @@ from drivetwin.export.modelica.model import write_modelica
 from drivetwin.export.targets import InputKind
 from drivetwin.files.twin_file import load_twin
 from drivetwin.logs.read import read_log
-from drivetwin.shifts.detect import require_shifts
+from drivetwin.shifts.detect import detect_shifts
 from drivetwin.simulation.dual_clutch import State
 from tests.export.modelica import compiled
 from tests.support.arrays import FloatArray
@@ -170,7 +170,7 @@ def test_modelica(name: str, as_logged: bool, tmp_path: Path) -> None:
     known = identify(name)
     twin, log = load_twin(known.twin), known.read_log()
     subject, whole = build_measured_subject(twin, log, as_logged=as_logged)
-    shift = require_shifts(log, twin.build_card()).shifts[0]
+    shift = detect_shifts(log, twin.build_card()).shifts[0]
     span = (whole.time >= shift.torque_phase[0] - 0.1) & (whole.time <= shift.lockup_time + 0.2)
     model, lag = subject.model, subject.delays.lag
     core = run_fixed_step(

@@ -24,8 +24,8 @@ from drivetwin.simulation.network import Sine, Start, simulate
 from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
 from tests.export.cases import paper_model
 
-LONG: list[Any] = [10**400, -(10**400), 10**5000, float("inf"), np.inf]
-NAMES = ["400 digits", "minus 400 digits", "5000 digits", "inf", "numpy inf"]
+LONG: list[Any] = [-(10**400), 10**5000, np.inf]
+NAMES = ["400 digits", "5000 digits", "inf"]
 GRID = np.linspace(0.0, 1.0, 3)
 ONE = Signal(np.array([0.0, 1.0]), np.array([1.0, 1.0]))
 REST = State(10.0, 1.0, 1.0, 0.0)

@@ -34,13 +34,6 @@ def test_rates_are_those_of_the_log(rates: Rates, step: float) -> None:
     assert made.recorded.truth.effects == {}
 
 
-def test_the_truth_has_the_whole_load() -> None:
-    """Some vehicles are drawn with air drag, whose part the truth would not contain."""
-    for seed in range(4):
-        recorded = make_mismatch_log(seed, None, 0.0, Rates.BUS).recorded
-        assert recorded.scenario.model.load.aero == 0.0
-
-
 def test_stated_tolerances_are_on_the_card_and_in_the_log() -> None:
     exact, wrong = (
         make_mismatch_log(2, None, 0.0, Rates.BUS, tolerances=stated) for stated in (False, True)
@@ -49,16 +42,6 @@ def test_stated_tolerances_are_on_the_card_and_in_the_log() -> None:
     assert wrong.card.sensors["output_torque"].gain == 0.01
     ratio = wrong.log["output_torque"].values / exact.log["output_torque"].values
     assert abs(np.median(ratio) - 1.0) > 1e-4
-
-
-def test_vehicles_differ_by_seed_and_have_the_log_again() -> None:
-    first, again, other = (
-        make_mismatch_log(seed, EffectId.TYRE_SLIP, 0.004, Rates.BUS) for seed in (5, 5, 6)
-    )
-    role = "output_torque"
-    assert np.array_equal(first.log[role].values, again.log[role].values)
-    truths = [each.recorded.truth.parameters["J_vehicle"] for each in (first, other)]
-    assert truths[0] != truths[1]
 
 
 def test_backlash_is_crossed() -> None:

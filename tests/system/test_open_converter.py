@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.added_elements import AddedElements
-from drivetwin.simulation.driveline import solve_steady_speed
 from drivetwin.simulation.driveline_run import DrivelineTask, simulate
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 from drivetwin.vehicle.card import load_card
+from tests.support.synth import synthesize
 
 
 def test_the_turbine_torque_moves_the_dual_clutch_as_the_converter_does() -> None:
@@ -66,18 +65,9 @@ def test_all_inertias_of_the_model_turn_behind_the_converter() -> None:
     assert np.max(np.abs(lighter.engine_speed - ran.engine_speed)) > 0.01
 
 
-def test_the_engine_starts_where_its_torque_is_steady() -> None:
-    scenario = load_scenario("open_converter")
-    assert scenario.converter is not None
-    engine = solve_steady_speed(scenario.converter, 1545.0, 140.0)
-    table = scenario.converter.converter
-    assert table.compute_pump_torque(engine, 140.0) == pytest.approx(1545.0)
-    assert table.compute_turbine_torque(engine, 140.0) > 1545.0
-
-
 def test_the_card_has_the_map(tmp_path: Path) -> None:
     scenario = load_scenario("open_converter")
-    _, card, _ = write_run(tmp_path / "open.csv", run(scenario, seed=0))
+    _, card, _ = synthesize(tmp_path / "open.csv", "open_converter")
     found = load_card(card).converter
     assert scenario.converter is not None
     assert found is not None

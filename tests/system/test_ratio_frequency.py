@@ -10,11 +10,9 @@ import pytest
 
 from drivetwin.authoring.log_survey import survey_log
 from drivetwin.channels.mapping import Mapped
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.result.estimate import Z95
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.spec import Z95
+from tests.support.synth import synthesize
 
 LOGS = 200
 
@@ -25,8 +23,7 @@ LOGS = 200
 def test_intervals_of_ratios_contain_the_truth(scenario: str, tmp_path: Path) -> None:
     inside: dict[str, int] = defaultdict(int)
     for seed in range(LOGS):
-        made = run(load_scenario(scenario), seed=seed)
-        log, card_file, _ = write_run(tmp_path / f"{seed}.csv", made)
+        log, card_file, _ = synthesize(tmp_path / f"{seed}.csv", scenario, seed)
         card, survey = load_card(card_file), survey_log(log, Mapped({}))
         found = {"final drive": (survey.final_drive, card.final_drive.value)}
         for gear, held in zip(card.gears, survey.gears, strict=True):

@@ -10,9 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.synth import write_run
-from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario_file import load_scenario
+from tests.support.synth import synthesize
 
 GERMAN = {
     "time": "Zeit",
@@ -28,7 +26,7 @@ GERMAN = {
 
 def write_german(folder: Path, name: str, seed: int) -> tuple[Path, Path]:
     """Write a log with German names and without units, and its card."""
-    log, card, _ = write_run(folder / "made.csv", run(load_scenario("paper_steps"), seed=seed))
+    log, card, _ = synthesize(folder / "made.csv", "paper_steps", seed)
     head, _, *rows = log.read_text().splitlines()
     names = ",".join(GERMAN[one] for one in head.split(","))
     log.unlink()

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,42 +20,22 @@ from benchmarks.estimation.rough import (
     read_results,
     run_study,
 )
-from benchmarks.estimation.rough_card import draw_ratio_text, write_card, write_ratio
+from benchmarks.estimation.rough_card import draw_ratio_text, write_card
 from benchmarks.estimation.rough_count import (
     RoughLog,
     compute_kept,
     compute_share,
-    count_inside,
-    list_far,
     summarise,
 )
-from benchmarks.estimation.unlisted import UNLISTED, UnlistedId, add_unlisted, follow_with_play
-from benchmarks.estimation.validity import StudyLog, find_size, make_log, make_sized_log, withhold
+from benchmarks.estimation.unlisted import UNLISTED, UnlistedId, add_unlisted
+from benchmarks.estimation.validity import StudyLog, make_log, make_sized_log
 from benchmarks.estimation.validity import summarise as summarise_validity
 from benchmarks.estimation.vehicles import draw_vehicle
-from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.vehicle.effects import EffectId
 
 BARE = 4
 """Seed of a vehicle that obeys the model and whose card states no gain with an error."""
-
-
-@pytest.mark.parametrize(
-    ("value", "digits", "cut", "text"),
-    [
-        (1.4845159, 3, False, "1.485"),
-        (1.4845159, 3, True, "1.484"),
-        (1.4999, 2, False, "1.50"),
-        (2.0049, 2, True, "2.00"),
-        (3.6439076, 5, True, "3.64390"),
-        (0.7194, 2, False, "0.72"),
-    ],
-)
-def test_ratio_is_rounded_or_cut_and_keeps_its_zeros(
-    value: float, digits: int, *, cut: bool, text: str
-) -> None:
-    assert write_ratio(value, digits, cut=cut) == text
 
 
 def _draw_errors(factor: float) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -126,23 +105,6 @@ def test_card_is_read_with_the_digits_of_its_text() -> None:
     assert ratios == pytest.approx(exact, abs=0.01)
 
 
-def test_groups_of_two_hundred_vehicles_are_even() -> None:
-    plans = [plan_vehicle(seed) for seed in range(9000, 9200)]
-    groups = Counter(one.group for one in plans)
-    assert groups == {"obeying": 90, "listed": 45, "unlisted": 45, "twice as rough": 20}
-    assert {one.effect for one in plans if one.group == "listed"} == {*EFFECTS}
-    assert {one.unlisted for one in plans if one.group == "unlisted"} == {None, *UNLISTED}
-    assert sum(one.factor == 2.0 for one in plans) == 20
-    assert all(one.mismatch == "" for one in plans if one.group == "obeying")
-
-
-def test_play_follows_behind_its_half_width() -> None:
-    up, down = np.linspace(0.0, 10.0, 101), np.linspace(10.0, 0.0, 101)
-    followed = follow_with_play(np.concatenate((up, down)), 1.5)
-    assert followed[:101] == pytest.approx(np.maximum(up - 1.5, 0.0))
-    assert followed[101:] == pytest.approx(np.minimum(down + 1.5, 8.5))
-
-
 @pytest.mark.parametrize("which", UnlistedId)
 def test_unlisted_mismatch_changes_its_own_channels_alone(which: UnlistedId) -> None:
     recorded = make_vehicle(BARE, plan_vehicle(BARE))[0].recorded
@@ -159,20 +121,6 @@ def test_unlisted_mismatch_changes_its_own_channels_alone(which: UnlistedId) -> 
     }
     assert changed == expected[which]
     assert wrong.truth is recorded.truth
-
-
-def test_withheld_effect_is_off_on_the_card() -> None:
-    card = make_vehicle(BARE, plan_vehicle(BARE))[0].card
-    hidden = withhold(card, EffectId.TYRE_SLIP)
-    assert (hidden.effects[EffectId.TYRE_SLIP].std, len(hidden.effects)) == (0.0, 1)
-    assert withhold(card) == card
-
-
-def test_drum_grows_with_the_vehicle() -> None:
-    sizes = [find_size(seed, EffectId.DRUM_INERTIA) for seed in range(5)]
-    doubled = [find_size(seed, EffectId.DRUM_INERTIA, 2.0) for seed in range(5)]
-    assert len(set(sizes)) == 5
-    assert doubled == pytest.approx([2.0 * one for one in sizes])
 
 
 @pytest.mark.parametrize("effect", [EffectId.BACKLASH, EffectId.INPUT_SHAFT_MODE])
@@ -216,11 +164,6 @@ def test_bootstrap_draws_logs_and_not_values() -> None:
     assert str(compute_share([0], [0])) == "none"
 
 
-def test_values_inside_are_those_within_the_95_percent_interval() -> None:
-    share = count_inside([{"eta": 1.9, "k_o": -1.97}, {}, {"eta": 0.0}])
-    assert (share.part, share.whole) == (2, 3)
-
-
 def test_log_without_result_keeps_nothing() -> None:
     share = compute_kept([11, 0], [13, 13])
     assert (share.part, share.whole) == (11, 26)
@@ -234,23 +177,6 @@ def test_log_without_result_keeps_nothing() -> None:
     assert "statuses          valid 1, no result 1" in text
     assert "1 x 2 faults" in text
     assert "mu_gain inside    not reported" in text
-
-
-def test_far_values_are_listed_once_for_a_log() -> None:
-    logs = [
-        _make_log(7, {"eta": 4.2, "k_o": -5.0, "c_o": 3.9}, mu_gain={"mu_gain.B3": 9.0}),
-        _make_log(8, {"eta": -1.0}),
-    ]
-    assert list_far(logs) == ["7 (none): eta +4.2, k_o -5.0"]
-    assert "  logs beyond 4     1" in summarise(logs)
-
-
-def test_mu_gain_is_counted_where_it_is_reported() -> None:
-    logs = [
-        _make_log(1, {}, mu_gain={"mu_gain.B3": 0.5}, mu_gain_reported=1),
-        _make_log(2, {}, mu_gain_reported=1),
-    ]
-    assert any("mu_gain inside    1 of 1" in line for line in summarise(logs))
 
 
 def test_finished_seeds_are_read_and_not_run_again(tmp_path: Path) -> None:

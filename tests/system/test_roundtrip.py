@@ -5,22 +5,21 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from drivetwin.cli.identify_run import IdentifyOptions, run_identification
-from drivetwin.cli.synth import write_run
+import drivetwin
 from drivetwin.dyno import dyno
-from drivetwin.dyno.files import format_card
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.dyno.truth import Truth
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from tests.support.repeats import mark_repeats
+from tests.support.synth import synthesize
 
 MODULATED = (ScenarioName.PAPER_STEPS, ScenarioName.THROTTLE_STEPS)
 WITHIN_HALF_A_PERCENT = (
@@ -30,16 +29,22 @@ WITHIN_HALF_A_PERCENT = (
 
 def _identified(
     folder: Path, scenario: ScenarioName, method: Method, noise: float
-) -> tuple[Identification, Truth]:
+) -> tuple[Identification, Any]:
     """Identify a run by the card of its scenario; the card of the paper's method has exact P0."""
-    bench = dyno.run(load_scenario(scenario), seed=11, noise=noise)
-    log, card, _ = write_run(folder / "run.csv", bench)
+    log, card, _ = synthesize(folder / "run.csv", scenario, 11, noise)
     if method is Method.PAPER:
         exact = re.sub(
             r"P0_bar = ([\d.]+)", r"P0_bar = { value = \1, std = 0.0 }", card.read_text()
         )
         card.write_text(exact)
-    return run_identification(log, IdentifyOptions(vehicle=card, method=method)).found, bench.truth
+    truth = dyno.run(load_scenario(scenario), noise=0.0).truth
+    return _identify(log, card, method), truth
+
+
+def _identify(path: Path, card_path: Path, method: Method) -> Identification:
+    card = drivetwin.load_card(card_path)
+    log = drivetwin.read_log(path, card)
+    return drivetwin.identify(log, card, drivetwin.detect_shifts(log, card), method)
 
 
 def _friction_error(curve: FrictionCurve, law: Stribeck | FrictionTable) -> float:
@@ -50,34 +55,21 @@ def _friction_error(curve: FrictionCurve, law: Stribeck | FrictionTable) -> floa
 @pytest.fixture(scope="module", params=mark_repeats(MODULATED, MODULATED[:1]))
 def noise_free(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Identification, Truth]:
+) -> tuple[Identification, Any]:
     return _identified(tmp_path_factory.mktemp("run"), request.param, Method.INTEGRAL, 0.0)
 
 
-@pytest.mark.parametrize("parameter", WITHIN_HALF_A_PERCENT)
 def test_noise_free_every_parameter_returns_within_half_a_percent(
-    parameter: str, noise_free: tuple[Identification, Truth]
+    noise_free: tuple[Identification, Any],
 ) -> None:
+    """Friction within one percent, the delay of the engine torque within half a millisecond."""
     found, truth = noise_free
-    assert found.estimates[parameter].value == pytest.approx(truth.parameters[parameter], rel=5e-3)
-
-
-def test_noise_free_friction_returns_within_one_percent(
-    noise_free: tuple[Identification, Truth],
-) -> None:
-    found, truth = noise_free
-    curve = found.friction["B3"]
+    for name in WITHIN_HALF_A_PERCENT:
+        assert found.estimates[name].value == pytest.approx(truth.parameters[name], rel=5e-3), name
+    curve, delay = found.friction["B3"], truth.parameters["te_delay"]
     assert curve.slip[-1] - curve.slip[0] > 30.0
     assert _friction_error(curve, truth.friction["B3"]) < 0.01
-
-
-def test_noise_free_delay_of_the_engine_torque_returns(
-    noise_free: tuple[Identification, Truth],
-) -> None:
-    found, truth = noise_free
-    assert found.estimates["te_delay"].value == pytest.approx(
-        truth.parameters["te_delay"], abs=5e-4
-    )
+    assert found.estimates["te_delay"].value == pytest.approx(delay, abs=5e-4)
 
 
 @pytest.mark.exhaustive
@@ -140,24 +132,15 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     np.savetxt(
         folder / "log.csv", rows, fmt="%.12g", delimiter=",", header="\n".join(head), comments=""
     )
-    card = folder / "card.toml"
-    card.write_text(format_card(load_scenario(ScenarioName.PAPER)), encoding="utf-8")
-    return run_identification(
-        folder / "log.csv", IdentifyOptions(vehicle=card, method=Method.INTEGRAL)
-    ).found
+    _, card, _ = synthesize(folder / "made.csv", ScenarioName.PAPER)
+    return _identify(folder / "log.csv", card, Method.INTEGRAL)
 
 
-@pytest.mark.parametrize("parameter", WITHIN_HALF_A_PERCENT)
 def test_log_cut_from_a_reference_solution_returns_its_parameters(
-    parameter: str, reference: Identification
-) -> None:
-    truth = dyno.run(load_scenario(ScenarioName.PAPER), noise=0.0).truth
-    value = reference.estimates[parameter].value
-    assert value == pytest.approx(truth.parameters[parameter], rel=5e-3)
-
-
-def test_log_cut_from_a_reference_solution_returns_its_friction(
     reference: Identification,
 ) -> None:
-    law = dyno.run(load_scenario(ScenarioName.PAPER), noise=0.0).truth.friction["B3"]
-    assert _friction_error(reference.friction["B3"], law) < 0.01
+    truth = dyno.run(load_scenario(ScenarioName.PAPER), noise=0.0).truth
+    for name in WITHIN_HALF_A_PERCENT:
+        value = reference.estimates[name].value
+        assert value == pytest.approx(truth.parameters[name], rel=5e-3), name
+    assert _friction_error(reference.friction["B3"], truth.friction["B3"]) < 0.01

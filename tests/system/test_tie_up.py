@@ -4,17 +4,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 
-from drivetwin.gearbox import Gearbox, list_builtin_gearboxes, load_gearbox, reduce
-from drivetwin.gearbox.compare import WholeGearbox, build_whole_gearbox
+from drivetwin.gearbox import (
+    Gearbox,
+    build_network_elements,
+    list_builtin_gearboxes,
+    load_gearbox,
+    reduce,
+)
+from drivetwin.gearbox.compare import build_whole_gearbox
 from drivetwin.gearbox.maneuver import plan
-from drivetwin.gearbox.network import build_network_elements
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Accuracy, Signal
+from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import Element, NetworkRun, Output, Start, simulate
 from tests.support.arrays import FloatArray
 from tests.support.repeats import mark_repeats
@@ -93,7 +99,7 @@ def loaded(box: Gearbox, capacities: dict[str, float], drive: float, load: float
     return simulate(elements, inputs, start, np.linspace(0.0, 1.0, 101), speeds(nodes))
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", mark_repeats(range(40), range(3)))
 @pytest.mark.parametrize("name", BOXES)
 def test_a_tied_up_gearbox_holds_up_to_its_limit_load(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -116,7 +122,7 @@ def test_a_tied_up_gearbox_holds_up_to_its_limit_load(name: str, seed: int) -> N
 def test_round_numbers_that_make_torques_meet_their_bounds_together_do_no_harm(name: str) -> None:
     rng, box = np.random.default_rng(2), load_gearbox(name)
     clutches = [each["name"] for each in elements_of(box) if each["type"] == "clutch"]
-    for case in range(60):
+    for case in range(15):
         levels = rng.choice([5.0, 10.0, 20.0, 200.0], len(clutches))
         capacities = dict(zip(clutches, map(float, levels), strict=True))
         way = float(rng.choice([-1.0, 1.0]))
@@ -126,26 +132,26 @@ def test_round_numbers_that_make_torques_meet_their_bounds_together_do_no_harm(n
         assert first == pytest.approx(0.5, abs=1e-6), f"case {case}"
 
 
-def under_any_pressures(name: str, rng: np.random.Generator) -> WholeGearbox:
+def under_any_pressures(name: str, rng: np.random.Generator) -> Any:
     """A shift from its start on, with torque and pressures that have nothing to do with it."""
     box = load_gearbox(name)
     assert box.drive is not None
     shift = reduce(box, box.gears[1].name, box.gears[2].name)
     stated = build_whole_gearbox(shift, plan(shift, box.drive))
-    pressures = [name for name in sorted(stated.inputs) if name != ENGINE_TORQUE]
+    pressures = [name for name in sorted(stated.inputs) if name != "engine torque"]
     high = max(float(stated.inputs[name].values.max()) for name in pressures)
-    torque = float(np.abs(stated.inputs[ENGINE_TORQUE].values).max())
+    torque = float(np.abs(stated.inputs["engine torque"].values).max())
     time = np.linspace(0.0, 1.0, 6)
 
     def line(values: FloatArray) -> Signal:
         return Signal(time, values)
 
     inputs = {each: line(rng.choice([0.0, 1.0, rng.uniform()], 6) * high) for each in pressures}
-    inputs[ENGINE_TORQUE] = line(rng.uniform(-1.0, 1.5, 6) * torque)
+    inputs["engine torque"] = line(rng.uniform(-1.0, 1.5, 6) * torque)
     return replace(stated, inputs=inputs)
 
 
-@pytest.mark.parametrize("name", mark_repeats(BOXES, ("ravigneaux-4", "zf-8hp70")))
+@pytest.mark.parametrize("name", mark_repeats(BOXES, ("ravigneaux-4",)))
 def test_a_gearbox_runs_through_any_pressures(name: str) -> None:
     rng, time = np.random.default_rng(1), np.linspace(0.0, 1.0, 1001)
     for case in range(60):

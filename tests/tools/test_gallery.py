@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import json
-
 from tools.gallery import ENTRIES, NOTEBOOK, PAGE, SHOTS, TUTORIALS, write_notebook, write_page
 from tools.picture import PICTURES
 
@@ -33,13 +31,3 @@ def test_each_tutorial_shows_its_pictures() -> None:
 def test_the_notebook_is_that_of_its_page() -> None:
     page = (TUTORIALS / "notebook.md").read_text(encoding="utf-8")
     assert NOTEBOOK.read_text(encoding="utf-8") == write_notebook(page)
-
-
-def test_a_notebook_has_the_code_of_a_page_without_what_it_prints() -> None:
-    page = "# Head\n\n```python\nx = 1\n```\n\n```text\n1\n```\n\n![a](b.png)\n\nEnd.\n"
-    cells = json.loads(write_notebook(page))["cells"]
-    assert [(one["cell_type"], one["source"]) for one in cells] == [
-        ("markdown", "# Head"),
-        ("code", "x = 1"),
-        ("markdown", "End."),
-    ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from tools.glossary_order import check_documents, find_undefined, list_pages, list_terms
+from tools.glossary_order import check_documents, find_undefined, list_terms
 
 GLOSSARY = """# Glossary
 
@@ -19,10 +19,6 @@ GLOSSARY = """# Glossary
 
 def test_the_documents_define_terms_before_they_use_them() -> None:
     assert check_documents() == []
-
-
-def test_terms_with_an_everyday_meaning_are_not_checked() -> None:
-    assert set(list_terms(GLOSSARY)) == {"slip", "lock-up"}
 
 
 @pytest.mark.parametrize(
@@ -41,8 +37,3 @@ def test_a_use_before_the_definition_is_found(
 ) -> None:
     pages = {"a.md": first, "b.md": second, "glossary.md": "", "c.md": "A slip at lock-up."}
     assert list(find_undefined(pages, list_terms(GLOSSARY))) == found
-
-
-def test_pages_follow_the_list_of_all_pages() -> None:
-    index = "| [c](c.md) |\n\n## All pages\n\n- [b](b.md), [a](x/a.md), [b](b.md)\n"
-    assert [page.name for page in list_pages(index)] == ["README.md", "b.md", "a.md"]

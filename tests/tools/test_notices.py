@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from tools.notices import NOTICES, SBOM, Crate, format_notices
+from tools.notices import NOTICES, SBOM
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -48,11 +48,3 @@ def test_the_list_of_crates_is_that_of_the_notices() -> None:
 def test_wheels_carry_them() -> None:
     assert NOTICES.name in toml("pyproject.toml")["project"]["license-files"]
     assert SBOM.name in toml("pyproject.toml")["tool"]["maturin"]["sbom"]["include"]
-
-
-def test_a_licence_stands_once_below_all_its_crates() -> None:
-    text = format_notices(
-        (Crate("a", "1.0", ("T",)), Crate("b", "2.0", ("U", "U")), Crate("c", "3", ("T",)))
-    )
-    assert "a 1.0\nc 3\n\nT\n" in text
-    assert text.endswith("b 2.0\n\nU\n")

@@ -68,14 +68,3 @@ def test_what_is_missing_is_one_line(
     (line,) = done.stderr.splitlines()
     assert line.startswith("drivetwin needs ")
     assert message in line
-
-
-def test_all_that_is_missing_is_said_at_once(tmp_path: Path) -> None:
-    done = run(tmp_path)
-    assert done.returncode == 1
-    assert len(done.stderr.splitlines()) == 3
-
-
-def test_a_newer_major_version_of_rust_is_accepted(machine: Path) -> None:
-    put(machine, "rustc", 'echo "rustc 2.0.0 (0 2030-01-01)"')
-    assert run(machine).returncode == 0

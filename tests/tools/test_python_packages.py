@@ -13,13 +13,8 @@ from tools.python_packages import (
     CONSTRAINTS,
     LICENCES,
     SBOM,
-    Package,
-    find_packages,
-    format_licences,
     list_requirements,
 )
-
-ASKED = ["pydantic>=2", "absent-package", "rich; python_version < '3'"]
 
 
 def read_names(text: str) -> set[str]:
@@ -53,19 +48,6 @@ def test_each_fixed_version_has_hashes() -> None:
     for entry in re.split(r"\n(?=\S)", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE)):
         assert re.search(r"--hash=sha256:[0-9a-f]{64}\b", entry), entry
     assert "://" not in text
-
-
-def test_needed_packages_are_followed() -> None:
-    found = {one.name: one for one in find_packages(ASKED)}
-    assert {"pydantic", "pydantic-core", "typing-extensions"} <= set(found)
-    assert found["pydantic"].licence == "MIT"
-    assert {"pydantic-core", "typing-extensions"} <= found["pydantic"].needs
-    assert "rich" not in found
-
-
-def test_formats() -> None:
-    packages = (Package("a", "1.0", "MIT"), Package("b", "2", "BSD"))
-    assert format_licences(packages).endswith("a 1.0: MIT\nb 2: BSD\n")
 
 
 def test_the_list_of_parts_is_that_of_the_licences() -> None:

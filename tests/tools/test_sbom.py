@@ -10,24 +10,6 @@ from pathlib import Path
 import pytest
 
 from tools import notices, python_packages
-from tools.sbom import Part, format_sbom
-
-ROOT = Part("pypi", "whole", "3", "MIT", frozenset({"pkg:pypi/a@1"}))
-PARTS = (
-    Part("pypi", "a", "1", "MIT", frozenset({"pkg:pypi/b@2", "pkg:pypi/absent@1"})),
-    Part("pypi", "b", "2", "BSD", is_optional=True),
-)
-
-
-def test_the_list_names_who_needs_what() -> None:
-    document = json.loads(format_sbom(ROOT, PARTS))
-    needs = {one["ref"]: one["dependsOn"] for one in document["dependencies"]}
-    assert needs == {
-        "pkg:pypi/whole@3": ["pkg:pypi/a@1"],
-        "pkg:pypi/a@1": ["pkg:pypi/b@2"],
-        "pkg:pypi/b@2": [],
-    }
-    assert [one["scope"] for one in document["components"]] == ["required", "optional"]
 
 
 @pytest.mark.parametrize("path", [notices.SBOM, python_packages.SBOM])

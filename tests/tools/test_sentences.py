@@ -3,43 +3,7 @@
 
 from __future__ import annotations
 
-from tools.sentences import count_words, find_long, list_pages, split_sentences
-
-PAGE = """\
-# A heading of some words
-
-The first sentence, by eq. 3, ends here. The second has `code of four words`, a [link](x.md)
-and $a + b = c$.
-
-- An item without an end
-- Another. With two.
-
-| a table | is none |
-|---|---|
-
-    indented code. It is none.
-
-```python
-x = 1  # Nor is this. At all.
-```
-"""
-
-
-def test_sentences_are_those_of_the_prose() -> None:
-    assert list(split_sentences(PAGE)) == [
-        "The first sentence, by eq. 3, ends here.",
-        "The second has X, a link and X.",
-        "An item without an end",
-        "Another.",
-        "With two.",
-    ]
-
-
-def test_more_than_thirty_words_are_long() -> None:
-    thirty = " ".join(["word"] * 29) + " - end."
-    assert count_words(thirty) == 30
-    assert find_long(thirty) == ([], 1)
-    assert find_long(f"One {thirty}") == ([f"One {thirty}"], 1)
+from tools.sentences import find_long, list_pages
 
 
 def test_the_documents_have_few_long_sentences() -> None:

@@ -12,10 +12,8 @@ import pytest
 from tools.theory_figures import (
     FIGURES,
     FOLDER,
-    Case,
     build_ellipse,
     draw_accuracy,
-    read_accuracy,
 )
 
 
@@ -29,24 +27,6 @@ def test_the_page_shows_every_figure() -> None:
 
 def test_the_figure_of_accuracy_is_that_of_its_tables() -> None:
     assert (FOLDER / "accuracy.svg").read_text(encoding="utf-8") == draw_accuracy()
-
-
-def test_rows_of_both_methods_are_read_from_a_section() -> None:
-    section = """# Accuracy
-
-## paper: known
-
-| eta | 0.029 % | integral | -0.001 | 0.030 | 1.01 | 98 % |
-| te_delay | 0.073 ms | likelihood | +0.019 | 0.198 | 2.73 | 92 % |
-
-Code of commit c1c906fda9.
-
-## No table
-
-Text.
-"""
-    rows = {"integral": [(1.01, 98.0)], "likelihood": [(2.73, 92.0)]}
-    assert read_accuracy(section) == [Case("paper: known", "c1c906fd", rows)]
 
 
 @pytest.mark.parametrize("name", FIGURES)

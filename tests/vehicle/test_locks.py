@@ -16,16 +16,9 @@ from drivetwin.errors import InputError
 from drivetwin.vehicle.locks import (
     apply_locks,
     collect_locks,
-    list_lockable,
 )
 from drivetwin.vehicle.spec import PriorValue
 from tests.report.sample import card as make_card
-
-
-def test_names_are_those_of_the_card() -> None:
-    names = list_lockable(make_card())
-    assert {"eta", "J_prime_2", "J_prime_3", "P0.B2", "P0.B3", "J_out"} <= set(names)
-    assert len(names) == len(set(names))
 
 
 def test_bounds_are_the_prior_with_the_moments_of_their_interval() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from drivetwin.channels.read_options import Column, ReadOptions
 from drivetwin.errors import DamagedChannelError, Where
-from drivetwin.logs.raw import RawChannel, Recording, Window
+from drivetwin.logs.raw import RawChannel
 
 NAMES = ("sound", "damaged", "hangs", "greedy", "dies", "faulty")
 
@@ -25,7 +25,7 @@ class HostileRecording:
     warnings: tuple[str, ...] = ("one warning",)
     columns = tuple(Column(name, "bar", "a group") for name in NAMES)
 
-    def load(self, index: int, window: Window | None = None) -> RawChannel:
+    def load(self, index: int, window: tuple[float, float] | None = None) -> RawChannel:
         """Read a column, or fail as its name says."""
         name = NAMES[index]
         if name == "damaged":
@@ -48,13 +48,13 @@ class HostileRecording:
 
 
 @contextmanager
-def open_hostile(_path: Path, _options: ReadOptions) -> Iterator[Recording]:
+def open_hostile(_path: Path, _options: ReadOptions) -> Iterator[HostileRecording]:
     """Open any file."""
     yield HostileRecording()
 
 
 @contextmanager
-def open_never(path: Path, _options: ReadOptions) -> Iterator[Recording]:
+def open_never(path: Path, _options: ReadOptions) -> Iterator[HostileRecording]:
     """Compute without end."""
     while True:
         path.name.lower()

@@ -10,11 +10,8 @@ import asammdf
 import numpy as np
 import pytest
 from asammdf.blocks.conversion_utils import from_dict
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivetwin.channels.read_options import BusOptions, ReadOptions
-from drivetwin.logs.formats.cell_text import parse_numbers, select_numbers
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 
@@ -23,21 +20,6 @@ CODES = np.tile([3, 4, 0, 15], 10).astype(np.uint8)
 NAN = float("nan")
 SNA = "10 'SNA' of 40 samples left out: by its text the code is no value"
 OTHER = "10 samples whose text is no number left out"
-
-
-@given(st.lists(st.floats(-1e6, 1e6), min_size=1), st.floats(0.1, 9.0))
-def test_numbers_are_read_as_written(numbers: list[float], shift: float) -> None:
-    texts = [f" {number!r}\t" for number in numbers]
-    assert parse_numbers(texts).tolist() == numbers
-    found = select_numbers(texts, np.array(numbers) + shift)
-    assert found is not None
-    assert found.values.tolist() == numbers
-    assert found.note
-
-
-@pytest.mark.parametrize("text", ["", "2nd", "G2", "0x2", "2 3", "nan", "inf", "1_0", "2,5", "-"])
-def test_words_are_no_numbers(text: str) -> None:
-    assert select_numbers([text, "N"], np.array([3.0, 4.0])) is None
 
 
 def read_mdf(folder: Path, table: dict[str, Any], codes: Any = CODES, kind: str = "4.10") -> Any:

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.channels.read_options import TimeColumn
 from drivetwin.errors import DrivetwinError, FileFormatError, MappingError, TimeError
 from drivetwin.logs.raw import RawLog
 from tests.logs.formats.text_logs import read_csv
@@ -20,7 +19,7 @@ STEP = 0.01
 
 def read(text: str | bytes) -> RawLog:
     data = text.encode() if isinstance(text, str) else text
-    return read_csv(data, "log.csv", TimeColumn())
+    return read_csv(data)
 
 
 def rows(

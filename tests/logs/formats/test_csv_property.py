@@ -9,7 +9,6 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.read_options import TimeColumn
 from drivetwin.errors import DrivetwinError
 from tests.logs.formats.text_logs import read_csv
 
@@ -75,7 +74,7 @@ def render(table: Cells, layout: Layout) -> bytes:
 
 @given(table=tables(), layout=LAYOUTS)
 def test_round_trip(table: Cells, layout: Layout) -> None:
-    log = read_csv(render(table, layout), "log.csv", TimeColumn())
+    log = read_csv(render(table, layout))
     assert [channel.name for channel in log.channels] == list(table)
     for channel, column in zip(log.channels, table.values(), strict=True):
         samples = [(0.5 * row, cell) for row, cell in enumerate(column) if cell is not None]
@@ -99,7 +98,7 @@ def test_damaged_bytes_give_channels_or_a_typed_error(
     start = int(place * len(data))
     damaged = data[:start] + inserted + data[start + removed :]
     try:
-        channels = read_csv(damaged, "log.csv", TimeColumn()).channels
+        channels = read_csv(damaged).channels
     except DrivetwinError as error:
         channels = ()
         refusal = error.remedy

@@ -10,6 +10,7 @@ import sys
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +19,6 @@ from scipy.io import savemat
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import DamagedChannelError, FileFormatError, ReaderFailureError
 from drivetwin.logs.formats import guarded
-from drivetwin.logs.formats.detect import open_recording
-from drivetwin.logs.formats.guarded import open_guarded
-from drivetwin.logs.raw import Opener, Recording
 from drivetwin.logs.read import read_log, read_raw
 from tests.fuzz.seeds import SEEDS
 from tests.logs.formats.hostile_readers import NAMES, HostileRecording, open_hostile, open_never
@@ -32,10 +30,10 @@ def _guarded(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Recording]:
+def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """A recording in a child that may take 64 MiB."""
     monkeypatch.setattr(guarded, "BASE_MEMORY", 2**26)
-    with open_guarded(open_hostile, tmp_path / "log.bin", ReadOptions()) as opened:
+    with guarded.open_guarded(open_hostile, tmp_path / "log.bin", ReadOptions()) as opened:
         yield opened
 
 
@@ -59,11 +57,11 @@ def crashing(tmp_path: Path) -> Path:
     return path
 
 
-def load(recording: Recording, name: str) -> None:
+def load(recording: Any, name: str) -> None:
     recording.load(NAMES.index(name))
 
 
-def test_columns_come_as_the_reader_gives_them(recording: Recording) -> None:
+def test_columns_come_as_the_reader_gives_them(recording: Any) -> None:
     here = HostileRecording()
     assert recording.columns == here.columns
     assert list(recording.warnings) == ["one warning"]
@@ -82,7 +80,7 @@ def test_columns_come_as_the_reader_gives_them(recording: Recording) -> None:
 
 
 def test_errors_of_a_column_come_back_as_they_were_and_others_are_read_on(
-    recording: Recording,
+    recording: Any,
 ) -> None:
     with pytest.raises(DamagedChannelError) as caught:
         load(recording, "damaged")
@@ -94,7 +92,7 @@ def test_errors_of_a_column_come_back_as_they_were_and_others_are_read_on(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux")
-def test_a_column_that_takes_too_much_memory_is_refused(recording: Recording) -> None:
+def test_a_column_that_takes_too_much_memory_is_refused(recording: Any) -> None:
     with pytest.raises(ReaderFailureError, match=r"more than 0\.1 GiB of memory") as caught:
         load(recording, "greedy")
     assert caught.value.where.file is not None
@@ -103,7 +101,7 @@ def test_a_column_that_takes_too_much_memory_is_refused(recording: Recording) ->
     load(recording, "sound")
 
 
-def test_a_reader_that_ends_is_a_typed_error_with_its_last_word(recording: Recording) -> None:
+def test_a_reader_that_ends_is_a_typed_error_with_its_last_word(recording: Any) -> None:
     for name in ("dies", "sound"):
         with pytest.raises(ReaderFailureError, match="code 7: a last word"):
             load(recording, name)
@@ -111,12 +109,12 @@ def test_a_reader_that_ends_is_a_typed_error_with_its_last_word(recording: Recor
 
 @pytest.mark.parametrize("opener", [open_hostile, open_never])
 def test_a_reader_that_hangs_is_stopped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opener: Opener
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opener: Any
 ) -> None:
     monkeypatch.setattr(guarded, "BASE_TIME", 3.0)
     with (
         pytest.raises(ReaderFailureError, match="not read after 3 s"),
-        open_guarded(opener, tmp_path / "log.bin", ReadOptions()) as recording,
+        guarded.open_guarded(opener, tmp_path / "log.bin", ReadOptions()) as recording,
     ):
         load(recording, "hangs")
 
@@ -137,7 +135,7 @@ def test_the_program_survives_a_file_that_crashes_the_library(crashing: Path) ->
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("name", ["mat", "mf4", "parquet", "blf"])
+@pytest.mark.parametrize("name", ["mf4"])
 def test_a_sound_file_is_read_as_without_the_guard(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
@@ -164,5 +162,4 @@ def test_text_is_read_in_this_process(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(subprocess, "Popen", None)
     path = tmp_path / "log.csv"
     path.write_text("time [s],x\n0,1\n1,2\n2,3\n")
-    with open_recording(path) as recording:
-        assert recording.columns
+    assert read_raw(path).channels

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.read_options import TimeColumn
 from drivetwin.errors import DrivetwinError, FileFormatError, TimeError
 from tests.logs.formats.text_logs import read_csv
 
@@ -70,7 +69,7 @@ def render(head: str, order: str, sep: str, decimal: str, rows: list[Reading]) -
 def test_readings_become_channels(
     head: str, order: str, sep: str, decimal: str, melted: bool
 ) -> None:
-    log = read_csv(render(head, order, sep, decimal, readings(melted)), "x", TimeColumn())
+    log = read_csv(render(head, order, sep, decimal, readings(melted)))
     assert [one.name for one in log.channels] == list(UNITS)
     start = log.channels[0].time[0]
     for place, one in enumerate(log.channels):
@@ -82,32 +81,32 @@ def test_readings_become_channels(
 
 def test_a_column_of_states_does_not_make_a_table_of_readings() -> None:
     rows = "".join(f"{0.01 * step:.2f},{'PRND'[step % 4]},{step}.5\n" for step in range(20))
-    log = read_csv(f"time [s],lever,speed [rpm]\n{rows}".encode(), "x", TimeColumn())
+    log = read_csv(f"time [s],lever,speed [rpm]\n{rows}".encode())
     assert [one.name for one in log.channels] == ["speed"]
 
 
 def test_readings_with_further_columns_are_refused() -> None:
     data = render("time [s],source,signal,value,unit", "TXNVU", ",", ".", readings())
     with pytest.raises(FileFormatError, match=r"each row is one reading.*source"):
-        read_csv(data, "x", TimeColumn())
+        read_csv(data)
 
 
 def test_readings_by_the_clock_without_a_date_are_refused() -> None:
     data = render("time,name,value", "CNV", ",", ".", readings())
     with pytest.raises(TimeError, match="midnight"):
-        read_csv(data, "x", TimeColumn())
+        read_csv(data)
 
 
 def test_a_channel_with_two_units_is_refused() -> None:
     data = render("time [s],name,value,unit", "TNVU", ",", ".", readings())
     last = data.rindex(b"bar")
     with pytest.raises(FileFormatError, match="'bar' and in 'kPa'"):
-        read_csv(data[:last] + b"kPa" + data[last + 3 :], "x", TimeColumn())
+        read_csv(data[:last] + b"kPa" + data[last + 3 :])
 
 
 def test_a_text_among_values_costs_its_channel_only() -> None:
     data = render("time [s],name,value,unit", "TNVU", ",", ".", readings())
-    log = read_csv(data.replace(b'"-20.2500"', b'"on"', 1), "x", TimeColumn())
+    log = read_csv(data.replace(b'"-20.2500"', b'"on"', 1))
     assert [one.name for one in log.channels] == ["TrqOut", "PrsBrk2"]
     assert log.unreadable == {"SpdIn": "line 2: a value of 'SpdIn' is no number"}
 
@@ -128,7 +127,7 @@ def test_a_text_among_values_costs_its_channel_only() -> None:
 def test_written_readings_read_back_equal(rows: list[Reading], sep: str, order: str) -> None:
     words = {"T": "time [s]", "N": "name", "V": "value", "U": "unit"}
     head = sep.join(words[letter] for letter in order)
-    log = read_csv(render(head, order, sep, ".", rows), "x", TimeColumn())
+    log = read_csv(render(head, order, sep, ".", rows))
     for one in log.channels:
         mine = [value for _, name, value in rows if name == one.name]
         assert one.values == pytest.approx(mine, abs=1e-4)
@@ -140,4 +139,4 @@ def test_damaged_readings_give_a_typed_error_at_worst(place: int, other: bytes) 
     data = render("time [s],name,value,unit", "TNVU", ",", ".", readings())
     damaged = data[:place] + other + data[place + 3 :]
     with contextlib.suppress(DrivetwinError):
-        read_csv(damaged, "x", TimeColumn())
+        read_csv(damaged)

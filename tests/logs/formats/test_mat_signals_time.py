@@ -66,11 +66,6 @@ def test_the_raster_in_the_name_decides_between_equal_lengths(tmp_path: Path) ->
     assert raw.unreadable == {"p": "several time vectors fit: time_10ms, time_20ms"}
 
 
-def test_equal_time_vectors_are_one(tmp_path: Path) -> None:
-    found = by_name(read(tmp_path, {"time_a": SLOW, "time_b": SLOW, "te": SLOW + 1.0}))
-    assert found["te"].time.tolist() == SLOW.tolist()
-
-
 def test_stamps_before_zero_and_one_that_repeats(tmp_path: Path) -> None:
     time = FAST - 0.05
     time[100] = time[99]
@@ -129,19 +124,13 @@ def test_a_recorder_of_dspace(tmp_path: Path) -> None:
     }
 
 
-def test_a_recorder_with_one_time_and_no_index(tmp_path: Path) -> None:
-    times = [{"Name": "t", "Data": SLOW - 0.05}]
-    raw = read(tmp_path, make_recorder(times, [{"Name": "te", "Data": SLOW}]))
-    assert by_name(raw)["rec_001.te"].time.tolist() == (SLOW - 0.05).tolist()
-
-
 def test_a_recorder_over_an_angle(tmp_path: Path) -> None:
     times = [{"Name": "crank", "Data": SLOW, "Unit": "bar"}]
     with pytest.raises(MissingChannelError, match="recorded over 'bar', not over time"):
         read(tmp_path, make_recorder(times, [{"Name": "te", "Data": SLOW, "XIndex": 1}]))
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(indices=st.lists(st.integers(1, 3), min_size=1, max_size=6))
 def test_any_recorder(tmp_path: Path, indices: list[int]) -> None:
     sizes = [30, 20, 10]

@@ -18,18 +18,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivetwin.channels.read_options import ReadOptions, TimeColumn
-from drivetwin.errors import DrivetwinError
-from drivetwin.logs.formats.detect import open_recording
+from drivetwin.errors import DamagedChannelError, DrivetwinError
 from drivetwin.logs.formats.mdf import open_mdf
 from drivetwin.logs.formats.mdf_plain import open_plain
-from drivetwin.logs.raw import Recording, Window
+from drivetwin.logs.read import read_raw
 from tests.fuzz.mutate import mutate
+from tests.support.mdf_files import CONVERSIONS, Known, write_random_mdf
 
 FAST = np.arange(0.0, 2.0, 0.001)
 SLOW = np.arange(0.0004, 2.0, 0.02)
 TYPES = ("u1", "u2", "u4", "u8", "i1", "i2", "i4", "i8", "f2", "f4", "f8")
 LINEAR = {"a": 0.1, "b": -40.0}
-WINDOWS: tuple[Window | None, ...] = (None, (0.5, 1.0), (1.9, 5.0), (3.0, 4.0))
+WINDOWS: tuple[tuple[float, float] | None, ...] = (None, (0.5, 1.0), (1.9, 5.0), (3.0, 4.0))
 
 
 def signal(
@@ -66,7 +66,7 @@ def edit(path: Path, change: Callable[[bytearray], None]) -> Path:
     return path
 
 
-def assert_equal(found: Recording, expected: Recording) -> None:
+def assert_equal(found: Any, expected: Any) -> None:
     """Compare columns, warnings and all samples, in windows too."""
     assert tuple(found.columns) == tuple(expected.columns)
     assert found.warnings == expected.warnings
@@ -142,20 +142,21 @@ def test_data_in_a_list_of_blocks(tmp_path: Path) -> None:
 
 def test_columns_of_a_group_share_their_stamps(tmp_path: Path) -> None:
     path = save(tmp_path / "log.mf4", [signal("x", FAST, FAST), signal("y", FAST, FAST)])
-    with open_recording(path) as recording:
-        assert recording.load(0).time is recording.load(1).time
+    one, other = read_raw(path).channels
+    assert one.time is other.time
 
 
 def test_no_library_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = save(tmp_path / "log.mf4", [signal("x", FAST, FAST**2)])
     monkeypatch.setitem(sys.modules, "asammdf", None)
-    with open_recording(path) as recording:
-        assert np.array_equal(recording.load(0).values, FAST**2)
+    assert np.array_equal(read_raw(path).channels[0].values, FAST**2)
 
 
 def test_a_file_that_is_cut_while_it_is_read_is_refused(tmp_path: Path) -> None:
     path = save(tmp_path / "log.mf4", [signal("x", FAST, FAST)])
-    with open_recording(path) as recording:
+    opened = open_plain(path, ReadOptions())
+    assert opened is not None
+    with opened as recording:
         path.write_bytes(path.read_bytes()[:1000])
         with pytest.raises(DrivetwinError, match="cut or damaged"):
             recording.load(0)
@@ -223,9 +224,7 @@ def test_blocks_that_are_not_plain(tmp_path: Path, change: Callable[[bytearray],
 
 
 @given(seed=st.integers(0, 10**6))
-@settings(
-    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_damaged_files_are_read_alike_or_left(tmp_path: Path, seed: int) -> None:
     whole = tmp_path / "whole.mf4"
     if not whole.exists():
@@ -238,3 +237,59 @@ def test_damaged_files_are_read_alike_or_left(tmp_path: Path, seed: int) -> None
     path.write_bytes(mutate(whole.read_bytes(), seed))
     if open_plain(path, ReadOptions()) is not None:
         compare(path)
+
+
+DAILY, ALL = 12, 386
+
+
+def check(recording: Any, known: dict[str, Known]) -> set[str]:
+    """Compare all samples of a file; return the kinds of the channels that were right."""
+    found = {column.name: index for index, column in enumerate(recording.columns)}
+    assert found.keys() == known.keys()
+    right = set()
+    for name, truth in known.items():
+        if not truth.valid.any():
+            if truth.time.size:
+                with pytest.raises(DamagedChannelError, match=r"left out|invalid"):
+                    recording.load(found[name])
+            continue
+        channel = recording.load(found[name])
+        np.testing.assert_allclose(channel.time, truth.time[truth.valid], rtol=1e-15)
+        # Sums of three terms cancel: their rounding counts against the largest value.
+        scale = np.nanmax(np.abs(truth.values), initial=1e-300)
+        np.testing.assert_allclose(
+            channel.values, truth.values[truth.valid], rtol=1e-12, atol=1e-14 * scale,
+            err_msg=f"{name}: {truth.kind}",
+        )  # fmt: skip
+        right.add(truth.kind.partition(" ")[0])
+    return right
+
+
+def read_files(folder: Path, seeds: range) -> tuple[set[str], int]:
+    """Read a file of each seed by asammdf and, if it is plain, without; count the plain ones."""
+    right: set[str] = set()
+    plain = 0
+    for seed in seeds:
+        path = folder / f"{seed}.mf4"
+        known = write_random_mdf(path, seed)
+        with open_mdf(path, ReadOptions()) as recording:
+            right |= check(recording, known)
+        if (opened := open_plain(path, ReadOptions())) is not None:
+            plain += 1
+            with opened as recording:
+                check(recording, known)
+        path.unlink()
+    return right, plain
+
+
+def test_known_samples_are_read(tmp_path: Path) -> None:
+    right, _ = read_files(tmp_path, range(DAILY))
+    assert right == set(CONVERSIONS)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.timeout(1800)
+def test_many_files_of_known_samples_are_read(tmp_path: Path) -> None:
+    right, plain = read_files(tmp_path, range(DAILY, ALL))
+    assert right == set(CONVERSIONS)
+    assert plain

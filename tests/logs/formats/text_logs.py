@@ -11,9 +11,9 @@ from drivetwin.logs.formats.csv import read_table
 from drivetwin.logs.raw import RawLog
 
 
-def read_csv(data: bytes, file: str, time: TimeColumn) -> RawLog:
+def read_csv(data: bytes, file: str = "log.csv", time: TimeColumn | None = None) -> RawLog:
     """Read all columns of a text log that is in memory."""
-    recording = read_table(BytesIO(data), file, time)
+    recording = read_table(BytesIO(data), file, time or TimeColumn())
     channels, unreadable = [], {}
     for index, column in enumerate(recording.columns):
         try:

@@ -11,15 +11,10 @@ import pytest
 
 from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel
-from drivetwin.errors import PlausibilityError, TimeError
 from drivetwin.findings import Number, render
 from drivetwin.logs.quality.consistency_checks import (
-    check_common_span,
-    check_coverage,
     check_final_drive,
-    check_gearing,
     check_torque_balance,
-    check_torque_signs,
 )
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.spec import PriorValue
@@ -35,72 +30,12 @@ def speeds(**levels: float) -> dict[str, Channel]:
     }
 
 
-def test_the_gears_of_the_card_and_their_neighbours_pass(tmp_path: Path) -> None:
-    for ratio in (1.8, 1.4, 1.0, 3.5):
-        channels = speeds(input_speed=100.0 * ratio, output_speed=100.0, wheel_speed=20.3)
-        check_gearing(channels, card(tmp_path), "log.csv")
-
-
-def test_exchanged_columns_are_told(tmp_path: Path) -> None:
-    channels = speeds(output_speed=20.0, wheel_speed=100.0)
-    with pytest.raises(PlausibilityError) as caught:
-        check_gearing(channels, card(tmp_path), "log.csv")
-    assert caught.value.what == (
-        "output_speed ('n_output_speed', rad/s) over wheel_speed ('n_wheel_speed', rad/s) is 0.2, "
-        "but the card has the final drive 5"
-    )
-    assert "columns are exchanged" in caught.value.remedy
-
-
-def test_standstill_and_absent_speeds_show_no_gearing(tmp_path: Path) -> None:
-    vehicle = card(tmp_path)
-    check_gearing(speeds(input_speed=70.0, output_speed=0.0), vehicle, "log.csv")
-    check_gearing(speeds(input_speed=70.0), vehicle, "log.csv")
-
-
-def test_channels_that_start_late_or_end_early_are_told() -> None:
-    channels = speeds(input_speed=180.0, output_speed=100.0, wheel_speed=20.0)
-    assert check_coverage(channels) == []
-    late = channels["output_speed"]
-    channels["output_speed"] = replace(late, time=late.time[10:], values=late.values[10:])
-    channels["wheel_speed"] = replace(late, time=late.time[:40], values=late.values[:40])
-    assert list(render(check_coverage(channels))) == [
-        f"channel 'n_output_speed': No samples from 0.000 s to {TIME[10]:.3f} s.",
-        f"channel 'n_output_speed': No samples from {TIME[39]:.3f} s to 0.500 s.",
-    ]
-
-
-def test_channels_without_a_common_time_are_refused() -> None:
-    channels = speeds(input_speed=180.0, output_speed=100.0, wheel_speed=20.0)
-    check_common_span(channels, "log.csv")
-    late = channels["wheel_speed"]
-    channels["wheel_speed"] = replace(late, time=late.time + 0.75)
-    with pytest.raises(TimeError) as caught:
-        check_common_span(channels, "log.csv")
-    assert "'n_wheel_speed' starts at 0.750 s" in caught.value.what
-    assert caught.value.what.endswith("_speed' ends at 0.500 s")
-
-
 def powered(ratio: float, share: float) -> dict[str, Channel]:
     """A gear of `ratio`, whose output torque is `share` of ratio times engine torque."""
     made = speeds(input_speed=100.0 * ratio, output_speed=100.0)
     for role, level in (("engine_torque", 800.0), ("output_torque", 800.0 * ratio * share)):
         made[role] = Channel(role, get_quantity(role), TIME, np.full(50, level), role, "Nm")
     return made
-
-
-def test_opposite_torques_are_refused() -> None:
-    check_torque_signs(powered(1.8, 0.9), "log.csv")
-    with pytest.raises(PlausibilityError, match="opposite signs") as caught:
-        check_torque_signs(powered(1.8, -0.9), "log.csv")
-    assert "sign = -1" in caught.value.remedy
-
-
-def test_torques_that_act_against_each_other_for_a_while_are_no_wrong_sign() -> None:
-    made = powered(1.8, 0.9)
-    values = made["output_torque"].values.copy()
-    values[:30] *= -1.0
-    check_torque_signs(made | {"output_torque": replace(made["output_torque"], values=values)}, "")
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Signals of a DBC against cantools' own decoding, frame by frame."""
+"""Signals of a DBC file in a bus log, against cantools' own decoding; logs after public reports."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
@@ -12,25 +14,25 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from drivetwin.channels.read_options import BusOptions, ReadOptions
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.can.database import (
-    decode_codes,
-    decode_physical,
-    read_database,
-    select_valid_payloads,
-)
-from drivetwin.logs.formats.frames import Signal
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.read import read_raw
 
 DBC = """VERSION ""
+
 BU_: A
+
 BO_ 291 Mixed: 8 A
  SG_ intel : 4|12@1+ (0.5,-10) [0|0] "rpm" A
  SG_ motorola : 23|16@0- (0.01,0) [0|0] "Nm" A
  SG_ single : 32|32@1- (1,0) [0|0] "bar" A
+
 BO_ 292 Switched: 8 A
  SG_ which M : 0|4@1+ (1,0) [0|15] "" A
  SG_ one m1 : 8|16@1+ (1,0) [0|0] "" A
  SG_ two m2 : 8|16@1+ (2,0) [0|0] "" A
+
 BO_ 293 Nested: 8 A
  SG_ outer M : 0|8@1+ (1,0) [0|255] "" A
  SG_ inner m0M : 8|8@1+ (1,0) [0|255] "" A
@@ -44,80 +46,104 @@ SG_MUL_VAL_ 293 wide outer 1-1;
 """
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("dbc") / "bus.dbc"
-    path.write_text(DBC)
-    return path
+def read(folder: Path, dbc: str, sent: Sequence[tuple[int, bytes]]) -> dict[str, RawChannel]:
+    """Read frames, 10 ms apart, by a DBC file."""
+    (folder / "bus.dbc").write_text(dbc)
+    lines = (f"({0.01 * k:.6f}) can0 {i:03X}#{data.hex()}\n" for k, (i, data) in enumerate(sent))
+    (folder / "bus.log").write_text("".join(lines))
+    raw = read_raw(folder / "bus.log", ReadOptions(bus=BusOptions((folder / "bus.dbc",))))
+    return {one.name: one for one in raw.channels}
 
 
-def _decoded(message: Any, payload: bytes, name: str) -> float:
-    return float(message.decode(payload)[name])
-
-
-def test_signals_agree_with_the_reference_decoder(path: Path) -> None:
-    mixed = read_database((path,))[0]
-    database = cantools.database.load_file(path)
-    assert isinstance(database, cantools.database.can.Database)
-    reference = database.get_message_by_name("Mixed")
+def test_signals_agree_with_the_reference_decoder(tmp_path: Path) -> None:
+    """Of all byte orders, signs and floats; of a multiplexer, also inside another, where sent."""
     chance = np.random.default_rng(0)
     data = chance.integers(0, 256, (200, 8)).astype(np.uint8)
     data[:, 4:8] = chance.normal(0.0, 100.0, 200).astype("<f4").view(np.uint8).reshape(-1, 4)
-    for signal in mixed.signals:
-        values = decode_physical(data, signal)
-        expected = [_decoded(reference, row.tobytes(), signal.name) for row in data]
-        assert values == pytest.approx(np.array(expected, np.float64), rel=1e-12), signal.name
+    sent = [(291, row.tobytes()) for row in data]
+    sent += [(292, bytes([1 + k % 2, 5, k, 0, 0, 0, 0, 0])) for k in range(40)]
+    sent += [(293, bytes([k % 2, 1, k, 7, 1, 0, 0, 0])) for k in range(80)]
+    reference: Any = cantools.database.load_string(DBC, "dbc")
+    expected: dict[str, list[tuple[float, float]]] = {}
+    for k, (number, payload) in enumerate(sent):
+        for name, value in reference.decode_message(number, payload).items():
+            expected.setdefault(name, []).append((0.01 * k, float(value)))
+    found = read(tmp_path, DBC, sent)
+    assert found.keys() == expected.keys()
+    for name, samples in expected.items():
+        stamps, values = np.array(samples).T
+        assert found[name].time == pytest.approx(stamps, abs=1e-9), name
+        assert found[name].values == pytest.approx(values, rel=1e-12), name
 
 
 @given(
-    start=st.integers(0, 63), length=st.integers(1, 56), intel=st.booleans(),
+    start=st.integers(0, 63), length=st.integers(1, 52), intel=st.booleans(),
     payload=st.binary(min_size=8, max_size=8),
 )  # fmt: skip
-@settings(suppress_health_check=[HealthCheck.filter_too_much])
-def test_bits_of_any_layout(start: int, length: int, intel: bool, payload: bytes) -> None:
-    signal = Signal("x", start, length, intel=intel)
-    assume(signal.end <= 8)
-    code = int(decode_codes(np.frombuffer(payload, np.uint8)[None, :], signal)[0])
+@settings(suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.function_scoped_fixture])
+def test_bits_of_any_layout(
+    tmp_path: Path, start: int, length: int, intel: bool, payload: bytes
+) -> None:
     bits = "".join(f"{byte:08b}" for byte in payload)
     if intel:
         positions = [8 * (bit // 8) + 7 - bit % 8 for bit in range(start, start + length)][::-1]
     else:
         first = 8 * (start // 8) + 7 - start % 8
         positions = list(range(first, first + length))
-    assert code == int("".join(bits[position] for position in positions), 2)
-
-
-def test_a_multiplexer_admits_its_own(path: Path) -> None:
-    switched = read_database((path,))[1]
-    data = np.array([[1, 5, 0, 0, 0, 0, 0, 0], [2, 5, 0, 0, 0, 0, 0, 0]], np.uint8)
-    by_name = {signal.name: signal for signal in switched.signals}
-    length = np.array([8, 8])
-    assert select_valid_payloads(data, length, by_name["one"]).tolist() == [True, False]
-    assert select_valid_payloads(data, length, by_name["two"]).tolist() == [False, True]
-    assert select_valid_payloads(data, np.array([2, 2]), by_name["one"]).tolist() == [False, False]
-
-
-def test_a_multiplexer_inside_another_admits_only_where_it_is_sent(path: Path) -> None:
-    nested = next(one for one in read_database((path,)) if one.name == "Nested")
-    database = cantools.database.load_file(path)
-    assert isinstance(database, cantools.database.can.Database)
-    reference = database.get_message_by_name("Nested")
-    payloads = [bytes((outer, 1, 7, 0, 0, 0, 0, 0)) for outer in (0, 1)]
-    data = np.array([list(one) for one in payloads], np.uint8)
-    for signal in nested.signals:
-        sent = [signal.name in reference.decode_simple(one) for one in payloads]
-        assert select_valid_payloads(data, np.array([8, 8]), signal).tolist() == sent, signal.name
-
-
-def test_what_does_not_fit_is_refused() -> None:
-    with pytest.raises(ValueError, match="x has 16 bits, ends in byte 9"):
-        decode_codes(np.zeros((1, 8), np.uint8), Signal("x", 56, 16))
+    assume(max(positions) < 64)
+    order = 1 if intel else 0
+    signal = f'SG_ x : {start}|{length}@{order}+ (1,0) [0|0] "" A'
+    dbc = f'VERSION ""\n\nBU_: A\n\nBO_ 291 M: 8 A\n {signal}\n'
+    code = int("".join(bits[position] for position in positions), 2)
+    found = read(tmp_path, dbc, 20 * [(291, payload)])
+    assert set(found["x"].values.tolist()) == {float(code)}
 
 
 def test_what_is_no_dbc(tmp_path: Path) -> None:
-    with pytest.raises(FileFormatError, match="cannot read the file: No such file"):
-        read_database((tmp_path / "none.dbc",))
-    wrong = tmp_path / "wrong.dbc"
-    wrong.write_text("BO_ what is this")
     with pytest.raises(FileFormatError, match="a DBC file cannot be read"):
-        read_database((wrong,))
+        read(tmp_path, "BO_ what is this", 20 * [(291, bytes(8))])
+
+
+def test_the_built_in_messages_are_those_that_cantools_reads(tmp_path: Path) -> None:
+    """A log with all messages of one frame: the same channels by the file and without it."""
+    with as_file(files("drivetwin.logs.formats.j1939") / "driveline.dbc") as dbc:
+        database: Any = cantools.database.load_file(dbc)
+        messages = [one for one in database.messages if one.length <= 8]
+        lines = [
+            f"({0.001 * k + 0.1 * turn:.6f}) can0 {one.frame_id:08X}#" + turn.to_bytes().hex() * 8
+            for turn in range(20)
+            for k, one in enumerate(messages)
+        ]
+        log = tmp_path / "bus.log"
+        log.write_text("\n".join(lines))
+        stated, built_in = read_raw(log, ReadOptions(bus=BusOptions((dbc,)))), read_raw(log)
+    assert len(built_in.channels) > len(messages)
+    assert built_in.unreadable == stated.unreadable
+    for own, other in zip(built_in.channels, stated.channels, strict=True):
+        assert (own.name, own.unit, own.group) == (other.name, other.unit, other.group)
+        assert own.values.tolist() == other.values.tolist()
+
+
+CASES = Path(__file__).resolve().parents[5] / "shared" / "cases" / "public4"
+
+
+def read_case(case: str, channel: str) -> RawChannel:
+    if not (CASES / case).is_dir():
+        pytest.skip("the shared logs are not beside the repository")
+    (log,) = (CASES / case).glob("log.*")
+    bus = BusOptions(tuple((CASES / case).glob("*.dbc")))
+    (found,) = read_raw(log, ReadOptions(bus=bus)).get_channels(channel)
+    return found
+
+
+def test_logs_after_public_reports() -> None:
+    """Named fault codes, units in UTF-8, flags of one bit, attached databases."""
+    torque = read_case("dbc_fault_code_torque_1", "EngTrq")
+    assert torque.values.max() < 2040.0
+    (note,) = torque.notes
+    assert note.startswith("29 'Fehler' of 501 samples left out")
+    assert read_case("dbc_utf8_units", "EngTrq").unit == "N·m"
+    assert read_case("dbc_utf8_units", "EngTemp").unit == "°C"
+    assert set(read_case("j1939_onebit_flag", "ShiftInProcess").values.tolist()) == {0.0, 1.0}
+    assert set(read_case("j1939_onebit_flag", "LockupEngaged").values.tolist()) == {1.0}
+    assert read_case("mdf_embedded_dbc", "TrqOut").unit == "Nm"

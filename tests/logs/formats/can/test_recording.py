@@ -12,13 +12,10 @@ import pytest
 
 from drivetwin.channels.read_options import BusOptions, ReadOptions
 from drivetwin.errors import DamagedChannelError, MissingChannelError
-from drivetwin.logs.formats.can.recording import BusRecording
-from drivetwin.logs.formats.detect import open_recording
-from drivetwin.logs.formats.frames import Message, Signal, build_frames
-from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw
-from tests.fuzz.seeds import SEEDS, candump
-from tests.logs.fixtures import card, columns
+from tests.fuzz.seeds import candump
+from tests.logs.fixtures import card
 
 
 @pytest.fixture
@@ -30,21 +27,6 @@ def log(tmp_path: Path) -> Path:
 
 def by_name(path: Path, options: ReadOptions | None = None) -> dict[str, RawChannel]:
     return {channel.name: channel for channel in read_raw(path, options).channels}
-
-
-@pytest.mark.parametrize(
-    "form", ["candump", "candump-L", "gvret", "asc", "asc-relative", "trc", "blf"]
-)
-def test_every_form_gives_the_same_signals(tmp_path: Path, form: str) -> None:
-    path = tmp_path / "bus.log"
-    path.write_bytes(SEEDS[form](tmp_path))
-    found = by_name(path)
-    speed = found["TransInputShaftSpeed"]
-    assert (speed.unit, speed.group) == ("rpm", "ETC1 from 0x03")
-    assert speed.values == pytest.approx(columns()["SpdIn"], abs=0.0625)
-    assert speed.time == pytest.approx(columns()["time"], abs=2e-6)
-    assert found["EngReferenceTorque"].values.tolist() == [2000.0]
-    assert found["EngReferenceTorque"].time == pytest.approx([0.75], abs=2e-6)
 
 
 def test_percent_torque_becomes_torque(log: Path) -> None:
@@ -91,11 +73,10 @@ def test_codes_that_are_no_value_are_left_out_and_told(log: Path) -> None:
 
 
 def test_what_a_sender_never_fills_is_no_candidate(log: Path) -> None:
-    with open_recording(log) as recording:
-        slip = [one.name for one in recording.columns].index("PercentClutchSlip")
-        assert recording.columns[slip].empty
-        with pytest.raises(DamagedChannelError, match="200 not available of 200"):
-            recording.load(slip)
+    raw = read_raw(log)
+    assert "PercentClutchSlip" not in by_name(log)
+    (reason,) = (text for name, text in raw.unreadable.items() if "PercentClutchSlip" in name)
+    assert "200 not available of 200" in reason
 
 
 def test_roles_are_recognised(log: Path, tmp_path: Path) -> None:
@@ -142,78 +123,82 @@ def test_another_bus_by_its_dbc(tmp_path: Path) -> None:
     assert (found["n_ab"].unit, found["n_ab"].group) == ("rpm", "Speeds")
 
 
-def test_the_mapping_file_names_the_dbc(tmp_path: Path) -> None:
-    from drivetwin.channels.mapping_file import read_mapping
+PLAIN = """VERSION ""
 
-    path = tmp_path / "map.toml"
-    path.write_text('[bus]\ndbc = ["bus.dbc"]\nreference_torque_Nm = 1109.0\n')
-    assert read_mapping(path).options.bus == BusOptions((tmp_path / "bus.dbc",), 1109.0)
+BU_: A
 
+BO_ 291 M: 2 A
+ SG_ speed : 0|8@1+ (1,0) [0|0] "rpm" A
+"""
+SWITCHED = """VERSION ""
 
-WHOLE = Signal("speed", 0, 8, unit="rpm")
-SWITCH = Signal("switch", 0, 8)
-PARTS = tuple(
-    Signal(f"part{code}", 8, 8, unit="rpm", selector=(SWITCH, frozenset((code,))))
-    for code in (0, 1)
-)
+BU_: A
+
+BO_ 291 M: 2 A
+ SG_ switch M : 0|8@1+ (1,0) [0|0] "" A
+ SG_ part0 m0 : 8|8@1+ (1,0) [0|0] "rpm" A
+ SG_ part1 m1 : 8|8@1+ (1,0) [0|0] "rpm" A
+"""
 
 
 def record(
-    stamps: Sequence[float], payloads: Sequence[bytes], signals: tuple[Signal, ...] = (WHOLE,)
-) -> BusRecording:
-    """Return a recording of one message that is not J1939."""
-    count = len(stamps)
-    frames = build_frames(stamps, [0x123] * count, [False] * count, payloads, ["can0"] * count)
-    message = Message("M", 0x123, extended=False, j1939=False, signals=signals)
-    return BusRecording(frames, [message], BusOptions(), Path("bus.log"))
+    folder: Path, stamps: Sequence[float], payloads: Sequence[bytes], dbc: str = PLAIN
+) -> RawLog:
+    """Read frames of one message that is not J1939."""
+    (folder / "bus.dbc").write_text(dbc)
+    rows = zip(stamps, payloads, strict=True)
+    lines = [f"({at:.6f}) can0 123#{payload.hex()}\n" for at, payload in rows]
+    (folder / "bus.log").write_text("".join(lines))
+    return read_raw(folder / "bus.log", ReadOptions(bus=BusOptions((folder / "bus.dbc",))))
 
 
 @pytest.mark.parametrize("step", [0.01, 0.0101], ids=["sorted", "left out"])
-def test_frames_that_others_overtook_are_sorted_up_to_20_ms(step: float) -> None:
+def test_frames_that_others_overtook_are_sorted_up_to_20_ms(tmp_path: Path, step: float) -> None:
     """The frames 10 and 11 come behind frame 12."""
     order = [*range(10), 12, 10, 11, *range(13, 20)]
-    recording = record([step * k for k in order], [bytes([k]) for k in order])
-    channel = recording.load(0)
+    raw = record(tmp_path, [step * k for k in order], [bytes([k]) for k in order])
+    (channel,) = raw.channels
     assert np.all(np.diff(channel.time) > 0.0)
     if step == 0.01:
         assert channel.values.tolist() == list(range(20))
-        assert "2 frames out of order by up to 20 ms sorted by their stamps" in recording.warnings
+        assert "2 frames out of order by up to 20 ms sorted by their stamps" in raw.warnings
     else:
         assert channel.values.tolist() == [*range(10), *range(11, 20)]
         assert channel.notes == ("1 frames with an earlier stamp left out",)
 
 
-def test_repeated_stamps_are_left_out_and_counted_for_each_signal() -> None:
+def test_repeated_stamps_are_left_out_and_counted_for_each_signal(tmp_path: Path) -> None:
     stamps = np.round(0.007 * np.arange(20), 2)
-    channel = record(stamps.tolist(), [bytes([k]) for k in range(20)]).load(0)
+    (channel,) = record(tmp_path, stamps.tolist(), [bytes([k]) for k in range(20)]).channels
     count = 20 - np.unique(stamps).size
     assert channel.notes == (f"{count} repeated frames left out",)
     assert channel.values.size == np.unique(stamps).size
 
 
-def test_frames_of_a_multiplexer_with_one_stamp_are_no_repeats() -> None:
+def test_frames_of_a_multiplexer_with_one_stamp_are_no_repeats(tmp_path: Path) -> None:
     stamps = np.repeat(0.01 * np.arange(15), 2).tolist()
     payloads = [bytes([code, k]) for k in range(15) for code in (0, 1)]
-    recording = record(stamps, payloads, PARTS)
-    for index in (0, 1):
-        channel = recording.load(index)
+    raw = record(tmp_path, stamps, payloads, SWITCHED)
+    for name in ("part0", "part1"):
+        (channel,) = raw.get_channels(name)
         assert channel.values.tolist() == list(range(15))
         assert channel.notes == ()
 
 
-def test_short_frames_are_left_out_and_counted() -> None:
+def test_short_frames_are_left_out_and_counted(tmp_path: Path) -> None:
     payloads = [bytes([0, k]) if k % 5 else bytes([0]) for k in range(20)]
-    channel = record([0.01 * k for k in range(20)], payloads, PARTS[:1]).load(0)
+    raw = record(tmp_path, [0.01 * k for k in range(20)], payloads, SWITCHED)
+    (channel,) = raw.get_channels("part0")
     assert channel.notes == ("4 frames too short for the signal left out",)
     assert channel.values.size == 16
 
 
 @pytest.mark.parametrize("first", [0.0, 1e4], ids=["clock set back", "one stamp far ahead"])
-def test_a_clock_that_runs_back_for_long_refuses_the_signal(first: float) -> None:
+def test_a_clock_that_runs_back_for_long_refuses_the_signal(tmp_path: Path, first: float) -> None:
     stamps = [first or 5.0, *(0.01 * k for k in range(1, 300))]
-    recording = record(stamps, [bytes([k % 200]) for k in range(300)])
-    with pytest.raises(DamagedChannelError, match="299 of 300 frames have an earlier stamp"):
-        recording.load(0)
+    raw = record(tmp_path, stamps, [bytes([k % 200]) for k in range(300)])
+    (reason,) = raw.unreadable.values()
+    assert "299 of 300 frames have an earlier stamp" in reason
 
 
 def test_the_fault_of_a_signal_reaches_the_user(tmp_path: Path) -> None:

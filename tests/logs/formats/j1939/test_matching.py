@@ -63,8 +63,10 @@ def lines(*frames: tuple[int, bytes]) -> bytes:
     return "\n".join(rows).encode()
 
 
-@pytest.mark.parametrize("attributes", ["", PROTOCOL, PROTOCOL + J1939PG])
-@pytest.mark.parametrize("identifier", [0x0CF00400, 0x0CF004FE, 0x18F004FE, 0x18F00421, 0x00F00400])
+@pytest.mark.parametrize(
+    ("identifier", "attributes"),
+    [(0x0CF004FE, ""), (0x18F00421, PROTOCOL), (0x00F00400, PROTOCOL + J1939PG)],
+)
 def test_priority_address_and_attributes_do_not_matter(
     tmp_path: Path, identifier: int, attributes: str
 ) -> None:

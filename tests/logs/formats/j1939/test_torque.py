@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.logs.formats.j1939 import torque
+from drivetwin.logs.formats.j1939.torque import add_fraction
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
@@ -22,26 +22,10 @@ def raw(name: str, time: list[float], values: list[float]) -> RawChannel:
     return RawChannel(name, "%", np.array(time), np.array(values), "EEC1 from 0x00")
 
 
-def test_percent_of_the_reference() -> None:
-    percent = raw("ActualEngPercentTorque", [0.0, 0.02], [50.0, -10.0])
-    found = torque.convert_to_torque(percent, 1109.0, "told")
-    assert (found.name, found.unit, found.notes) == ("ActualEngTorque", "Nm", ("told",))
-    assert found.values.tolist() == pytest.approx([554.5, -110.9])
-    assert torque.derive_torque_name("Retarder") == "Retarder_Nm"
-
-
 def test_the_fraction_is_added_where_it_is_sent() -> None:
     percent = raw("ActualEngPercentTorque", [0.0, 0.02, 0.04], [50.0, 51.0, 52.0])
-    found = torque.add_fraction(percent, raw("f", [0.0, 0.04], [0.125, 0.875]))
+    found = add_fraction(percent, raw("f", [0.0, 0.04], [0.125, 0.875]))
     assert found.values.tolist() == [50.125, 51.0, 52.875]
-
-
-def test_net_torque_is_unknown_without_friction() -> None:
-    actual = raw("a", [0.0, 0.1, 0.2, 0.3], [10.0, 11.0, 12.0, 13.0])
-    friction = raw("f", [0.05, 0.15, 0.25], [1.0, 2.0, 3.0])
-    found = torque.compute_net_torque(actual, friction)
-    assert found.time.tolist() == [0.1, 0.2]
-    assert found.values == pytest.approx([11.0 - 1.5, 12.0 - 2.5])
 
 
 @pytest.fixture(params=["normal", "address_claim"])
@@ -92,7 +76,7 @@ def test_a_decoded_bus_has_the_net_torque(tmp_path: Path) -> None:
     path = tmp_path / "bus.csv"
     path.write_text(PERCENT.format(first=650))
     log = read_raw(path)
-    (net,) = (one for one in log.channels if one.name == torque.NET_TORQUE)
+    (net,) = (one for one in log.channels if one.name == "EngNetTorque")
     assert net.unit == "Nm"
     assert net.values == pytest.approx([221.0, 286.0, 351.0])
     assert "in percent of 650 N·m (EngReferenceTorque), less friction" in net.notes
@@ -102,7 +86,7 @@ def test_a_reference_torque_that_changes_gives_no_torque(tmp_path: Path) -> None
     path = tmp_path / "bus.csv"
     path.write_text(PERCENT.format(first=700))
     log = read_raw(path)
-    assert torque.NET_TORQUE not in [one.name for one in log.channels]
+    assert "EngNetTorque" not in [one.name for one in log.channels]
 
 
 def test_a_net_torque_of_the_file_is_not_derived_again(tmp_path: Path) -> None:
@@ -111,4 +95,4 @@ def test_a_net_torque_of_the_file_is_not_derived_again(tmp_path: Path) -> None:
     lines = text.splitlines()
     path.write_text("\n".join([lines[0] + ",EngNetTorque", *(one + ",1" for one in lines[1:])]))
     named = [one.name for one in read_raw(path).channels]
-    assert named.count(torque.NET_TORQUE) == 1
+    assert named.count("EngNetTorque") == 1

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Traces of PEAK-System's tools: the same frames as another program, damage costs its line only."""
+"""Traces of PEAK-System's tools: the frames that another program wrote, damage costs its line."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
@@ -12,8 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.can.texts import is_bus_text, read_bus_text
-from drivetwin.logs.formats.frames import Frames
+from drivetwin.logs.formats.can.texts import read_bus_text
 
 VERSION_1_0 = """\
 ;##########################################################################
@@ -74,8 +74,7 @@ VERSION_2_1 = """\
 """
 
 
-def read(text: str) -> Frames:
-    assert is_bus_text(text.encode())
+def read_trc(text: str) -> Any:
     return read_bus_text(text.encode(), "bus.trc")
 
 
@@ -99,7 +98,7 @@ def test_each_version(
     other: int,
     end: str,
 ) -> None:
-    found = read(text.replace("\n", end))
+    found = read_trc(text.replace("\n", end))
     assert found.time * 1e3 == pytest.approx(stamps)
     assert found.identifier.tolist() == identifiers
     assert found.length.tolist() == lengths
@@ -107,18 +106,18 @@ def test_each_version(
 
 
 def test_a_mark_of_utf8_and_commas_in_stamps() -> None:
-    found = read("\ufeff" + VERSION_1_1.replace(".0 ", ",0 ").replace(".8 ", ",8 "))
+    found = read_trc("\ufeff" + VERSION_1_1.replace(".0 ", ",0 ").replace(".8 ", ",8 "))
     assert found.time * 1e3 == pytest.approx([-1.8, 18.0, 22.9])
     assert found.warnings == ("3 remote or error frames left out",)
 
 
 def test_bus_and_kind_of_identifier() -> None:
-    found = read(VERSION_1_2)
+    found = read_trc(VERSION_1_2)
     assert [found.buses[k] for k in found.bus] == ["channel 0", "channel 1"]
     assert found.extended.tolist() == [True, False]
 
 
-_FRAME = st.builds(
+_TRC_FRAME = st.builds(
     can.Message,
     timestamp=st.integers(0, 10**9).map(lambda us: us / 1e6),
     arbitration_id=st.integers(0, 0x7FF),
@@ -131,10 +130,10 @@ _FRAME = st.builds(
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
-    st.lists(_FRAME, min_size=1, max_size=20),
+    st.lists(_TRC_FRAME, min_size=1, max_size=20),
     st.sampled_from([TRCFileVersion.V1_0, TRCFileVersion.V2_1]),
 )
-def test_frames_are_those_that_another_program_wrote(
+def test_trc_frames_are_those_that_another_program_wrote(
     tmp_path: Path, sent: list[can.Message], version: TRCFileVersion
 ) -> None:
     path = tmp_path / "bus.trc"
@@ -163,8 +162,8 @@ def test_frames_are_those_that_another_program_wrote(
         "      9       2.7 DT",
     ],
 )
-def test_a_damaged_line_costs_its_frame_only(line: str) -> None:
-    found = read(VERSION_2_1 + line + "\n")
+def test_a_damaged_trc_line_costs_its_frame_only(line: str) -> None:
+    found = read_trc(VERSION_2_1 + line + "\n")
     assert found.time.size == 3
     assert found.warnings[1:] == ("1 damaged lines left out of 5",)
 
@@ -172,9 +171,4 @@ def test_a_damaged_line_costs_its_frame_only(line: str) -> None:
 @pytest.mark.parametrize("columns", ["N,O,T,B,d,R,L,D", "N,O,O,T,I,D", "D,N,O,T,I,L"])
 def test_columns_without_frames(columns: str) -> None:
     with pytest.raises(FileFormatError, match="do not hold time, type, identifier and data"):
-        read(VERSION_2_1.replace("N,O,T,B,I,d,R,L,D", columns))
-
-
-def test_what_is_no_trace() -> None:
-    assert not is_bus_text(b"; comment\ntime;n\n0.01;1\n")
-    assert not is_bus_text(b"time,n\n0.01,1\n")
+        read_trc(VERSION_2_1.replace("N,O,T,B,I,d,R,L,D", columns))
