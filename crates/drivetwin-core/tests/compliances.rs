@@ -292,3 +292,29 @@ fn a_viscous_coupling_to_the_ground_stops_a_mass_that_must_exist() {
     let error = Network::compile(&Driveline { elements }).expect_err("a member without mass");
     assert!(error.to_string().contains("m"), "{error}");
 }
+
+/// The damper decides most of this contact: its rate falls by a factor of 20 in every passage.
+#[test]
+fn a_damped_coupling_without_a_gap_comes_to_rest() {
+    for (driven, driving) in [(-2.3e-15, 4.3e-15), (0.0, 1.0), (100.0, 101.0)] {
+        let network = compile(vec![
+            inertia("driven", 3.85),
+            inertia("driving", 1.4e-4),
+            Element::Backlash(Backlash {
+                name: "spline".into(),
+                a: "driving".into(),
+                b: "driven".into(),
+                stiffness: 25_486.0,
+                damping: 25.486,
+                gap: 0.0,
+            }),
+        ]);
+        let begin = start(&[("driving", driving), ("driven", driven)], &[]);
+        let outputs = ["driving", "driven"].map(|node| Output::Speed(node.into()));
+        let run = simulate(&network, &[], &begin, &grid(2.0, 41), &outputs);
+        assert_eq!(run.status, Status::Completed, "from {driven} rad/s");
+        let slip =
+            run.columns[0].last().expect("a sample") - run.columns[1].last().expect("a sample");
+        assert!(slip.abs() <= 1e-9, "{slip} rad/s are left");
+    }
+}

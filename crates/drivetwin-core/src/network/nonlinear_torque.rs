@@ -323,6 +323,15 @@ impl<T: Number> NonlinearTorque<T> {
         }
     }
 
+    /// Magnitudes of the weights of twist and rate in border `i` of a compliance; None of other laws.
+    pub fn border_weights(&self, branch: Branch, i: usize) -> Option<[T::Values; 2]> {
+        let (TorqueLaw::Regions(regions), Branch::Region { index }) = (&self.law, branch) else {
+            return None;
+        };
+        let (border, _) = &regions[index].borders[i];
+        Some([border.per_twist, border.per_rate].map(|weight| weight.re().magnitude()))
+    }
+
     /// Boundaries of the active branch.
     pub fn boundaries(
         &self,

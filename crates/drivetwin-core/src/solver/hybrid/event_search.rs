@@ -12,14 +12,14 @@ use crate::solver::lane_mask::lanes_in;
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::tolerances::{
     ACCELERATION_ATOL, BOUND_RTOL, FORCED_SLIP_RTOL, GRAZING_RTOL, RELEASE_RATE_RTOL,
-    RELEASE_SUM_RTOL, SUM_RTOL, TORQUE_ATOL, sum_and_scale,
+    RELEASE_SUM_RTOL, SUM_RTOL, TAYLOR_TOL, TORQUE_ATOL, sum_and_scale,
 };
 
 /// The earliest fall within `h` [s], refined so that the time carries derivatives, and whether it
 /// grazes.
 pub fn earliest<T: Real>(state: &HybridState<'_, T>, h: f64) -> Option<(T, EventCause, bool)> {
     let mut best: Option<(f64, Series<T>, EventCause)> = None;
-    all_guards(state, &mut |series: Series<T>, cause: EventCause| {
+    all_guards(state, h, &mut |series: Series<T>, cause: EventCause| {
         let horizon = best.as_ref().map_or(h, |b| b.0);
         let (falls, t) = first_zero_crossing(&series, state.expansion.order, 1, horizon);
         if falls == 1 && best.as_ref().is_none_or(|b| t < b.0) {
@@ -39,7 +39,7 @@ pub fn earliest_per_lane<const K: usize>(
     h: SimdVector<K>,
 ) -> [Option<(f64, EventCause)>; K] {
     let (mut causes, mut fallen, mut earliest) = ([None; K], 0, h);
-    all_guards(state, &mut |series: Series<SimdVector<K>>, cause: EventCause| {
+    all_guards(state, h, &mut |series: Series<SimdVector<K>>, cause: EventCause| {
         let order = state.expansion.order;
         let kernel = ZeroCrossingKernel { series: &series, order, runs, horizon: earliest };
         let (falls, t) = dispatch_simd(kernel);
@@ -68,9 +68,10 @@ impl<const K: usize> Kernel for ZeroCrossingKernel<'_, K> {
     }
 }
 
-/// Hand on every guard with what its fall causes.
+/// Hand on every guard within `h` [s] with what its fall causes.
 fn all_guards<T: Number>(
     state: &HybridState<'_, T>,
+    h: T::Values,
     consider: &mut impl FnMut(Series<T>, EventCause),
 ) {
     for j in 0..state.rows.len() {
@@ -81,11 +82,38 @@ fn all_guards<T: Number>(
     }
     for (i, channel) in state.network.channels.iter().enumerate() {
         let series = &state.expansion.channels[i];
-        for (border, next) in channel.boundaries(state.branches[i], &state.expansion.inputs, series)
-        {
+        let branch = state.branches[i];
+        let borders = channel.boundaries(branch, &state.expansion.inputs, series);
+        for (place, (mut border, next)) in borders.into_iter().enumerate() {
+            if let Some([twist, rate]) = channel.border_weights(branch, place) {
+                let error =
+                    argument_error(state, i, 0) * twist + argument_error(state, i, 1) * rate;
+                ignore_unresolved(&mut border, state.expansion.order, h, error);
+            }
             consider(border, EventCause::BranchBoundary(i, next));
         }
     }
+}
+
+/// Truncation error of an argument of a channel over a step, to which every term may contribute.
+fn argument_error<T: Number>(state: &HybridState<'_, T>, channel: usize, i: usize) -> T::Values {
+    let terms = state.network.channels[channel].arguments[i].iter().zip(&state.expansion.scales);
+    let sum = |sum, (c, scale): (&T, &T)| sum + c.re().magnitude() / scale.re();
+    terms.fold(T::Values::zero_(), sum) * TAYLOR_TOL * (state.expansion.order + 1) as f64
+}
+
+/// Lift a guard that stays within the truncation `error` for all of `h` [s]. A damped coupling without a gap
+/// would cross the borders of such a motion without end.
+fn ignore_unresolved<T: Number>(
+    guard: &mut Series<T>,
+    order: usize,
+    h: T::Values,
+    error: T::Values,
+) {
+    let size = guard[..=order].iter().rev();
+    let size = size.fold(T::Values::zero_(), |sum, c| sum * h + c.re().magnitude());
+    let unresolved = (size - error).mask_where(|excess| excess <= 0.0);
+    guard[0] = guard[0].replace_where(unresolved, T::promote(size + size));
 }
 
 fn friction_guards<T: Number>(
