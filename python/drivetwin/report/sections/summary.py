@@ -126,7 +126,7 @@ def build_friction_section(found: Identification) -> Section:
     """μ over slip of every element, for the gain on the card, with its verdict."""
     blocks: list[Block] = []
     for element, curve in found.friction.items():
-        caption = f"Friction of {element}, {_describe_verdict(curve)}. "
+        caption = f"Friction of {element}, {_describe_verdict(curve).rstrip('.')}. "
         blocks.append(FigureBlock(plot_friction(element, curve), caption + _format_law(curve)))
     if found.friction:
         blocks.append(build_friction_table(found.friction))
