@@ -318,3 +318,12 @@ fn a_damped_coupling_without_a_gap_comes_to_rest() {
         assert!(slip.abs() <= 1e-9, "{slip} rad/s are left");
     }
 }
+
+#[test]
+fn an_undamped_coupling_without_a_gap_is_a_shaft() {
+    let (name, a, b) = ("play".into(), "a".into(), "b".into());
+    let play = Backlash { name, a, b, stiffness: 600.0, damping: 0.0, gap: 0.0 };
+    let run = swing(Element::Backlash(play), 0.05);
+    assert_eq!(run.columns, swing(shaft("a", "b", 600.0, 0.0), 0.05).columns);
+    assert_balanced(&run);
+}

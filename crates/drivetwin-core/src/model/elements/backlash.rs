@@ -5,7 +5,7 @@ use crate::model::Name;
 use crate::model::declare::described;
 use crate::model::error::{ModelError, require_apart};
 use crate::model::mechanism::{Mechanism, Region, Spring, SpringLaw, Stop, TwistForm};
-use crate::number::Number;
+use crate::number::{Number, Values};
 
 described! {
     /// Coupling with play.
@@ -34,6 +34,13 @@ impl<T: Number> Backlash<T> {
 
     pub(crate) fn state_law(&self, m: &mut Mechanism<T>) {
         let row = m.row(&[(&self.a, T::of(1.0)), (&self.b, T::of(-1.0))]);
+        // No other torque than that of a spring, whose twist has no borders to cross.
+        let absent = |v: T| v.is_constant() && v.re().mask_where(|v| v != 0.0) == 0;
+        if absent(self.gap) && absent(self.damping) {
+            let law = SpringLaw::Linear { stiffness: self.stiffness, damping: self.damping };
+            m.springs.push(Spring { element: self.name.clone(), row, law });
+            return;
+        }
         let half_gap = self.gap * 0.5;
         let stop = |side: f64| Stop { stiffness: self.stiffness, at: half_gap * side, side };
         let stops = vec![stop(1.0), stop(-1.0)];
