@@ -71,14 +71,13 @@ Pair = tuple[Outcome, Outcome]
 def format_table(outcomes: Outcomes) -> list[str]:
     """Format one row for each variant, by the logs that have both results."""
     bases = [one for one in outcomes.values() if one.variant == ALL_ON]
-    names = dict.fromkeys([ALL_ON, *(name for one in bases for name in one.idle)])
-    names |= dict.fromkeys(one.variant for one in outcomes.values())
+    names = {one.variant for one in outcomes.values()} | {k for one in bases for k in one.idle}
     lines = [
         "| without | logs | run | inside | kept | far | new far | now outside | now inside "
         "| lost | gained | CPU [s] | CPU |",
         "|" + "---|" * 13,
     ]
-    for name in names:
+    for name in sorted(names, key=lambda one: (one != ALL_ON, one)):
         found = [(one, find_outcome(outcomes, one.study, one.seed, name)) for one in bases]
         pairs = [(base, other) for base, other in found if other is not None]
         if pairs:
@@ -119,7 +118,7 @@ def _format_row(name: str, pairs: Sequence[Pair]) -> str:
         if name in base.identified
     ]
     cells = [
-        "nothing" if name == ALL_ON else name.replace("_", " ").removeprefix("effects: "),
+        "nothing" if name == ALL_ON else name.replace("_", " "),
         len(pairs),
         sum(other is not base for base, other in pairs),
         f"{inside} of {len(identified)} = {100.0 * inside / max(len(identified), 1):.1f} %",
