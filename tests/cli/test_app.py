@@ -96,11 +96,6 @@ def test_no_text_of_the_package_has_backticks() -> None:
     assert marked == []
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--version"]) == 0
-    assert capsys.readouterr().out.startswith("drivetwin ")
-
-
 def test_wrong_usage_is_exit_code_2(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["shifts", "--no-such-option"]) == 2
     assert "--no-such-option" in capsys.readouterr().err

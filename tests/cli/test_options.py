@@ -55,3 +55,17 @@ def test_an_earlier_result_is_replaced(folder: Path) -> None:
     assert (folder / "map.toml").read_text() == text
     assert main([*command, "--channels", str(folder / "map.toml")]) == 2
     assert (folder / "map.toml").read_text() == text
+
+
+def test_a_folder_with_an_input_stays_as_it_was(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of three files that would be written one is the card: none is."""
+    card = folder / "out" / "twin.toml"
+    card.parent.mkdir()
+    shutil.copy(folder / "log.card.toml", card)
+    command = ["identify", str(folder / "log.csv"), "--vehicle", str(card), "--method", "paper"]
+    assert main([*command, "-o", str(card.parent)]) == 2
+    assert f"{card}: this file is read by the same command" in capsys.readouterr().err
+    assert [path.name for path in card.parent.iterdir()] == ["twin.toml"]
+    assert card.read_bytes() == (folder / "log.card.toml").read_bytes()

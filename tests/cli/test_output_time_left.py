@@ -26,16 +26,6 @@ def test_time_left_follows_from_the_share_done() -> None:
     assert str(line) == "identifying, likelihood: 25 %, about 18 s left"
 
 
-def test_an_estimate_that_was_too_short_is_not_shown() -> None:
-    """No "about 1 s left" for most of the time."""
-    clock = Clock()
-    line = Remaining("identifying", clock)
-    clock.now += 10.0
-    line.update(0.9, "")
-    clock.now += 30.0
-    assert str(line) == "identifying: 90 %, 40 s so far"
-
-
 def test_the_time_left_is_smooth() -> None:
     """A jump of the share moves the time left by a part of the jump at first."""
     clock = Clock()
