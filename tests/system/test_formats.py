@@ -62,8 +62,8 @@ def test_the_result_does_not_depend_on_the_format(
     assert first.keys() == other.keys()
     assert len(first) > 200
     for place, value in first.items():
-        rel = 1e-6 if place.startswith("fit") else 1e-7
-        assert other[place] == pytest.approx(value, rel=rel, abs=1e-9), place
+        rel = 1e-6 if place.startswith("fit") else ROUND_OFF
+        assert other[place] == pytest.approx(value, rel=rel, abs=ROUND_OFF), place
 
 
 def list_numbers(value: Any, place: str = "") -> dict[str, float]:

@@ -52,7 +52,7 @@ def evaluate_truth(slip: float) -> float:
 def test_the_values_are_true_with_rounded_ratios(card: str) -> None:
     vehicle = drivetwin.load_card(CASE / f"{card}.toml")
     found = identify_validated(drivetwin.read_log(CASE / "Schaltung_23.csv", vehicle), vehicle)
-    assert found.status.value != "not valid"
+    assert found.status.is_confirmed
     truth, gain = load_truth(), json.loads((CASE / "truth.json").read_text())["gain"][1]
     curve = found.friction["K2"]
     truth["mu_gain.K2"] = gain * evaluate_truth(curve.middle_slip)
