@@ -70,7 +70,7 @@ def find_changes(time: FloatArray, values: FloatArray) -> Changes:
     sizes = values[rows] - values[rows - 1]
     least = np.abs(sizes) < 1.5 * estimate_resolution(values)
     stair = np.zeros(rows.size, dtype=bool)
-    stair[1:] = least[1:] & least[:-1] & (sizes[1:] * sizes[:-1] > 0.0)
+    stair[1:] = least[1:] & least[:-1] & (np.sign(sizes[1:]) * np.sign(sizes[:-1]) > 0.0)
     return Changes(time[rows], time[rows] - time[rows - 1], rows, stair)
 
 

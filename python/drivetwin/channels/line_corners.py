@@ -104,8 +104,9 @@ def _have_digits(values: FloatArray, digits: int) -> bool:
 
 
 def _are_multiples(values: FloatArray, step: float | FloatArray) -> bool:
-    scaled = values / step
-    return bool(np.all(np.abs(scaled - np.round(scaled)) <= _WHOLE))
+    with np.errstate(over="ignore", invalid="ignore"):  # steps far below the numbers: no multiples
+        scaled = values / step
+        return bool(np.all(np.abs(scaled - np.round(scaled)) <= _WHOLE))
 
 
 @dataclass(frozen=True, eq=False)
