@@ -254,6 +254,23 @@ def test_a_coast_down_needs_no_input() -> None:
     assert abs(found.values["load.aero"] - 2e-4) < 3.0 * found.std["load.aero"]
 
 
+def test_a_point_on_the_axis_of_a_table_can_be_an_unknown() -> None:
+    """The core has no derivatives by it, as its schema states."""
+    model = Model("retarder")
+    wheel = model.inertia("wheel", 2.0)
+    model.viscous_coupling("oil", wheel, model.ground, slip=[10.0, 200.0], torque=[4.0, 6.0])
+    model.start({wheel: 100.0})
+    run = model.simulate(np.arange(0.0, 30.0, 0.02))
+    outputs = {"wheel": wheel.speed}
+    recording = record_run(run, {}, outputs, {"wheel": 0.02})
+    unknown = {"oil.slip.0": Unknown(12.0, 4.0)}
+    known = {name: Tolerance(exact=True) for name in ("wheel", "oil")}
+    found = model.fit(recording, unknown, outputs, tolerances=known)
+    assert found.status is ModelStatus.VALID
+    assert found.std["oil.slip.0"] < 1.0
+    assert abs(found.values["oil.slip.0"] - 10.0) < 3.0 * found.std["oil.slip.0"]
+
+
 def change(**entries: object) -> tuple[NetworkModel, list[Recording]]:
     model, recording = make_small(LEFT)
     return replace(model, **entries), [recording]  # type: ignore[arg-type]

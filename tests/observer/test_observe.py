@@ -79,13 +79,15 @@ def test_without_pressures_the_bands_widen_and_hold(bench: Bench) -> None:
 
 def test_a_twin_without_scale_is_refused(bench: Bench) -> None:
     """A twin from a log without output torque has ratios over η only."""
-    told = dict(bench.twin.parameters)
+    parameters = dict(bench.twin.parameters)
     torque_like = ("J_", "k_o", "c_o", "Tv_over_if", "mu_gain", "drum", "eta")
     for name, one in bench.twin.parameters.items():
         if name.startswith(torque_like):
-            told[name] = replace(one, value=None, std_noise=None, verdict=Verdict.NOT_IDENTIFIABLE)
-            told[name + "_over_eta"] = replace(one, id=name + "_over_eta")
-    twin = replace(bench.twin, parameters=told)
+            parameters[name] = replace(
+                one, value=None, std_noise=None, verdict=Verdict.NOT_IDENTIFIABLE
+            )
+            parameters[name + "_over_eta"] = replace(one, id=name + "_over_eta")
+    twin = replace(bench.twin, parameters=parameters)
     assert twin.over_eta
     with pytest.raises(MissingParameterError, match="over η only"):
         estimate_torques(twin, bench.log, bench.shift)

@@ -21,6 +21,7 @@ from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.fit.number_kinds import USUAL, UsualDeviation
 from drivetwin.fit.unknown import ASCII_UNITS
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind
+from drivetwin.simulation.element_schema import Field as ElementField
 from drivetwin.simulation.serialize import is_number
 from drivetwin.simulation.variable import exp
 from drivetwin.vehicle.spec import describe_ratio
@@ -147,7 +148,7 @@ def _list_of_element(
     """Yield the fixed numbers of an element, and the factors that some of them share."""
     levels: dict[str, list[Place]] = {}
     kinds = USUAL[str(element["type"])]
-    for keys, field, unit, number in iterate_numbers(element):
+    for keys, field, schema, number in iterate_numbers(element):
         usual, path, place = kinds[field], _join(element, keys), (index, *keys)
         if path in unknown or number == 0.0 or (usual.unit and number == 1.0):
             continue
@@ -158,6 +159,7 @@ def _list_of_element(
         std, source = _find_deviation(number, usual, stated)
         if std > 0.0:
             is_relative = not (usual.absolute or usual.digits)
+            unit = schema.unit.translate(ASCII_UNITS)
             yield FixedNumber(path, float(number), std, unit, is_relative, (place,), source)
     for shared, places in levels.items():
         (level,) = {one.level for one in kinds.values() if one.shared == shared}
@@ -201,10 +203,11 @@ def make_plain(description: Any) -> Any:
     return description
 
 
-def iterate_numbers(element: Mapping[str, Any]) -> Iterator[tuple[Place, str, str, float]]:
-    """Yield the keys, the field, the unit and the value of each number of an element."""
+def iterate_numbers(element: Mapping[str, Any]) -> Iterator[tuple[Place, str, ElementField, float]]:
+    """Yield the keys, the path of the field, its schema and the value of each number of an
+    element."""
     fields = ELEMENT_FIELDS[str(element["type"])]
-    waiting: list[tuple[Place, str, Any, Any]] = [
+    waiting: list[tuple[Place, str, ElementField, Any]] = [
         ((name,), name, one, element.get(name)) for name, one in fields.items()
     ]
     while waiting:
@@ -218,8 +221,7 @@ def iterate_numbers(element: Mapping[str, Any]) -> Iterator[tuple[Place, str, st
                 for name, each in inner.items()
             ]
         else:
-            unit = one.unit.translate(ASCII_UNITS)
-            yield from (((*keys, *at), field, unit, each) for at, each in _iterate_cells(value))
+            yield from (((*keys, *at), field, one, each) for at, each in _iterate_cells(value))
 
 
 def _iterate_cells(value: Any) -> Iterator[tuple[Place, float]]:

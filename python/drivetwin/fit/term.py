@@ -56,11 +56,12 @@ class Plant:
     accuracy: Accuracy = field(default_factory=Accuracy)
 
     @cached_property
-    def _places(self) -> dict[str, Place]:
+    def _places(self) -> dict[str, tuple[Place, bool]]:
+        """Place of each number by its path, and whether the core differentiates by it."""
         return {
-            ".".join(map(str, (one["name"], *keys))): (index, *keys)
+            ".".join(map(str, (one["name"], *keys))): ((index, *keys), field.differentiable)
             for index, one in enumerate(self.elements)
-            for keys, *_ in iterate_numbers(one)
+            for keys, _, field, _ in iterate_numbers(one)
         }
 
     def get_start_name(self, name: str) -> str:
@@ -69,9 +70,10 @@ class Plant:
 
     def list_undifferentiated(self) -> list[str]:
         """List the coordinates that act on numbers by which the core has no derivatives."""
-        tables = {path for path, place in self._places.items() if _is_table(place)}
-        sought = [one.name for one in self.sought if tables & one.factors.keys()]
-        fixed = [one.coordinate for one in self.fixed if any(map(_is_table, one.places))]
+        plain = {path: place for path, (place, known) in self._places.items() if not known}
+        places = {*plain.values()}
+        sought = [one.name for one in self.sought if plain.keys() & one.factors.keys()]
+        fixed = [one.coordinate for one in self.fixed if places.intersection(one.places)]
         return [*sought, *fixed]
 
     def get_step(self, name: str) -> float:
@@ -106,7 +108,7 @@ class Plant:
                 elif head == "start":
                     (speeds if rest in speeds else twists)[rest] = number
                 else:
-                    elements.put(self._places[path], number)
+                    elements.put(self._places[path][0], number)
         for fixed in self.fixed:
             x = point[fixed.coordinate]
             for place in fixed.places:
@@ -116,15 +118,8 @@ class Plant:
         return NetworkTask(elements.listed, every, start, time, outputs, self.accuracy)
 
 
-_TABLES = ("map", "losses", "drag", "least_speed")
-"""Fields and groups of elements that the core does not differentiate by."""
 _SHARE, _STEP = 1e-3, 0.1
 """Steps of a difference of runs: of an unknown [ratio], of a fixed number [standard deviations]."""
-
-
-def _is_table(place: Place) -> bool:
-    """Return whether the core has no derivatives by the number at a place."""
-    return place[1] in _TABLES or place[1:3] == ("friction", "slip")
 
 
 _PROBES = 8

@@ -274,9 +274,8 @@ class Model(ElementMethods):
         Raises InputError with all faults of the model.
         """
         elements = [component.element for component in self.components]
-        start = self._resolve_start()
-        given = (self.name, elements, self.inputs, start, outputs, unknowns)
-        return NetworkModel(*given, tolerances or {})
+        start, known = self._resolve_start(), tolerances or {}
+        return NetworkModel(self.name, elements, self.inputs, start, outputs, unknowns, known)
 
     def list_outputs(self) -> list[Output]:
         """List everything that a run records."""

@@ -63,13 +63,15 @@ class Field(NamedTuple):
     """Field of an element or group.
 
     `absent` is the meaning of a missing optional field, `default` the value that the builder takes.
-    A group has the alternatives of its fields.
+    `differentiable` is True where the core differentiates by the number. A group has the
+    alternatives of its fields.
     """
 
     kind: FieldKind
     required: bool
     absent: str | None
     default: float | str | None
+    differentiable: bool
     unit: str
     limit: Limit | None
     choices: tuple[str, ...]
@@ -96,6 +98,7 @@ def _read_field(one: Mapping[str, Any]) -> Field:
         required=one["required"],
         absent=one["absent"],
         default=one["default"],
+        differentiable=one["differentiable"],
         unit=one["unit"],
         limit=limit and Limit(limit["least"], limit["above"], limit["most"], tuple(limit["not"])),
         choices=tuple(one["choices"]),

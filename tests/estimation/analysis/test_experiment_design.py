@@ -23,8 +23,8 @@ def _rank(found: Identification) -> Any:
 
 def _get_again(found: Identification, name: str) -> tuple[Any, Any]:
     """Return the ranking of a parameter, and its prospect by the same shift again."""
-    (told,) = (one for one in _rank(found) if one.parameter == name)
-    return told, next(p for p in told.prospects if p.experiment.name.lower() == AGAIN)
+    (ranked,) = (one for one in _rank(found) if one.parameter == name)
+    return ranked, next(p for p in ranked.prospects if p.experiment.name.lower() == AGAIN)
 
 
 def test_throttle_steps_tell_the_age_of_a_torque_that_stood_still() -> None:
@@ -44,8 +44,8 @@ def test_throttle_steps_tell_the_age_of_a_torque_that_stood_still() -> None:
 
 def test_the_same_shift_again_halves_the_variance() -> None:
     """True of what no prior and no start state shares with the log."""
-    told, again = _get_again(still(), "c_o")
-    assert again.half_width == pytest.approx(told.half_width / np.sqrt(2.0), rel=0.02)
+    ranked, again = _get_again(still(), "c_o")
+    assert again.half_width == pytest.approx(ranked.half_width / np.sqrt(2.0), rel=0.02)
 
 
 def test_order_is_by_worth_and_least_known_are_told_too() -> None:
@@ -64,17 +64,17 @@ def test_what_sensors_decide_no_experiment_narrows() -> None:
     c_o = found.estimates["c_o"]
     assert c_o.std_noise is not None
     wide = replace(c_o, std_systematic=20.0 * c_o.std_noise)
-    told = _rank(replace(found, estimates={**found.estimates, "c_o": wide}))
-    (one,) = (s for s in told if s.parameter == "c_o")
+    ranked = _rank(replace(found, estimates={**found.estimates, "c_o": wide}))
+    (one,) = (s for s in ranked if s.parameter == "c_o")
     assert not one.prospects
     assert "Calibrate the sensors" in one.text
 
 
 def test_an_identification_takes_up_what_would_tell_it_more() -> None:
-    told = rank_experiments(still())
-    assert [one.parameter for one in told.evidence.suggestions][:1] == ["te_delay"]
+    ranked = rank_experiments(still())
+    assert [one.parameter for one in ranked.evidence.suggestions][:1] == ["te_delay"]
     assert rank_experiments(by_the_paper()) is by_the_paper()
-    numbers = {one.parameter: one.number for one in told.evidence.suggestions}
+    numbers = {one.parameter: one.number for one in ranked.evidence.suggestions}
     assert numbers["k_o"] == still().evidence.numbers["k_o"]
 
 

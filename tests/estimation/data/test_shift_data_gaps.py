@@ -71,7 +71,7 @@ def test_gaps_cost_precision_only(gaps: Gaps) -> None:
     assert _list_moved(found) == []
     if gaps.get("engine_torque") == STEP:
         (shift,) = found.shifts
-        assert shift.before[0] > STEP[1], "the cut is told and the validation keeps to it"
+        assert shift.before[0] > STEP[1], "the validation keeps to the reported cut"
         assert any("no samples from" in text for text in render(shift.findings))
 
 

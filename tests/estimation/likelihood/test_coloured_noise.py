@@ -41,10 +41,10 @@ def test_a_filtered_sensor_widens_intervals_to_what_its_noise_does() -> None:
     plain = _spread(_draw(1, slow=False)[:, 0])
     assert np.diag(plain @ fit.normal.information) == pytest.approx(1.0, rel=1e-6)
     moves = plain @ (fit.normal.regressors[0].T @ noise)
-    told = _spread(noise[:, 0])
+    spread = _spread(noise[:, 0])
     for name in ("eta", "Tv_over_if", "J_vehicle"):
         k = fit.point.names.index(name)
         scatter = float(np.std(moves[k]))
         assert scatter > 1.3 * np.sqrt(plain[k, k]), "the case is of no use"
         # Blocks of 20 ms show the noise of this filter nearly, a log's mean all of it.
-        assert 0.7 * scatter < np.sqrt(told[k, k]) < 1.5 * scatter
+        assert 0.7 * scatter < np.sqrt(spread[k, k]) < 1.5 * scatter

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a log decides about its own model: load, sampling of the signals, minimum, plant, loss law.
+"""Choices of a model by its log: load, sampling of the signals, minimum, plant, loss law.
 
 Each log is identified as a user's would be. The code in its findings names the decision, and the
 truth lies within the intervals.
@@ -205,9 +205,9 @@ def test_backlash_that_the_dual_clutch_cannot_follow_is_identified() -> None:
     assert cause.group.effect is EffectId.BACKLASH
     assert cause.size == pytest.approx(size, rel=0.1)
     truth = made.recorded.truth.parameters
-    told = {n: e for n, e in found.estimates.items() if e.verdict is Verdict.IDENTIFIED}
-    assert len(told.keys() & truth.keys()) >= 8
-    _assert_true(found, truth, [*(told.keys() & truth.keys())])
+    identified = {n: e for n, e in found.estimates.items() if e.verdict is Verdict.IDENTIFIED}
+    assert len(identified.keys() & truth.keys()) >= 8
+    _assert_true(found, truth, [*(identified.keys() & truth.keys())])
     largest = np.max(np.abs(made.recorded.trajectory.shaft_torque))
     gap = 2.0 * size * largest / made.recorded.scenario.model.k_o
     assert found.estimates["backlash"].value == pytest.approx(gap, rel=0.15)

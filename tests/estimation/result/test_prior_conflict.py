@@ -43,14 +43,14 @@ def _found(design: PriorValue, sensors: float = 0.0) -> Any:
 
 
 @pytest.mark.parametrize("std", [0.02, 0.1, 0.3])
-@pytest.mark.parametrize(("apart", "told"), [(2.9, False), (7.0, True)])
+@pytest.mark.parametrize(("apart", "is_reported"), [(2.9, False), (7.0, True)])
 def test_a_contradiction_is_the_distance_from_what_the_log_alone_tells(
-    std: float, apart: float, told: bool
+    std: float, apart: float, is_reported: bool
 ) -> None:
     design = PriorValue(LOG[0] + apart * float(np.hypot(std, STD)), std)
     moved = _posterior(design)[0][0] - design.value
     found = _found(design)
-    assert bool(found) == (told and abs(moved) > std)
+    assert bool(found) == (is_reported and abs(moved) > std)
     for one in found:
         assert one.apart == pytest.approx(apart, rel=1e-6)
         assert (one.log.value, one.log.std) == pytest.approx((LOG[0], STD), rel=1e-6)
@@ -81,10 +81,10 @@ def test_what_rests_on_a_contradicted_value_is_not_identified() -> None:
         name: Estimate(name, value, std, Verdict.IDENTIFIED, "likelihood")
         for name, value, std in zip(IDS, values, np.sqrt(np.diag(covariance)), strict=True)
     }
-    told = apply_contradictions(estimates, _found(design), "likelihood with design prior")
-    assert told["J_out"].verdict is told["J_prime_2"].verdict is Verdict.WEAK
-    assert "the log gives 14.300 kg·m²" in told["J_prime_2"].reason
-    assert told["Tv_over_if"] == estimates["Tv_over_if"]
+    judged = apply_contradictions(estimates, _found(design), "likelihood with design prior")
+    assert judged["J_out"].verdict is judged["J_prime_2"].verdict is Verdict.WEAK
+    assert "the log gives 14.300 kg·m²" in judged["J_prime_2"].reason
+    assert judged["Tv_over_if"] == estimates["Tv_over_if"]
 
 
 def test_an_exact_value_and_one_that_physics_excludes_are_judged_elsewhere() -> None:
@@ -95,14 +95,16 @@ def test_an_exact_value_and_one_that_physics_excludes_are_judged_elsewhere() -> 
         assert find_contradictions(("J_out",), values, nothing, design, nothing) == ()
 
 
-@pytest.mark.parametrize(("eta", "std", "told"), [(1.06, 2e-4, True), (1.01, 0.01, False)])
-def test_an_efficiency_above_one_is_not_identified(eta: float, std: float, told: bool) -> None:
+@pytest.mark.parametrize(("eta", "std", "is_reported"), [(1.06, 2e-4, True), (1.01, 0.01, False)])
+def test_an_efficiency_above_one_is_not_identified(
+    eta: float, std: float, is_reported: bool
+) -> None:
     estimates = {"eta": Estimate("eta", eta, std, Verdict.IDENTIFIED, "likelihood")}
     found, findings = check_efficiency_limit(estimates, "dissipative")
-    assert found["eta"].verdict is (Verdict.WEAK if told else Verdict.IDENTIFIED)
+    assert found["eta"].verdict is (Verdict.WEAK if is_reported else Verdict.IDENTIFIED)
     assert [("1.06" in text, "overrun" in text) for text in render(findings)] == [
         (True, False)
-    ] * told
+    ] * is_reported
     by_paper = check_efficiency_limit(estimates, "paper")[1]
-    assert ["overrun" in one.remedy for one in by_paper] == [True] * told
+    assert ["overrun" in one.remedy for one in by_paper] == [True] * is_reported
     assert check_efficiency_limit({}, "paper") == ({}, ())

@@ -333,9 +333,9 @@ def test_a_burst_of_lost_messages_is_left_out(lost: int, first: int, role: str) 
     assert not left[start:end].any()
     assert left[: start - 2].all()
     assert left[end:].all()
-    told = {one.code for one in checked.findings} - {Code.NO_SAMPLES, Code.TABLE_ROWS_COARSE}
-    assert told <= {Code.MESSAGES_LOST, Code.STUCK}
-    assert told
+    codes = {one.code for one in checked.findings} - {Code.NO_SAMPLES, Code.TABLE_ROWS_COARSE}
+    assert codes <= {Code.MESSAGES_LOST, Code.STUCK}
+    assert codes
 
 
 def test_a_slow_message_in_a_fast_table_is_no_burst() -> None:

@@ -26,9 +26,9 @@ def test_an_age_at_the_limit_of_the_search_is_not_identified() -> None:
     upper[start.names.index("te_delay")] = limit = made.truth["te_delay"] - SHORT
     fit = fit_local(replace(posed, upper=upper), start)
     assert fit is not None
-    told = build_estimates(fit, [made.signals], [made.driveline], {}, EffectPriors(NO_EFFECT))
-    age = told.estimates["te_delay"]
+    concluded = build_estimates(fit, [made.signals], [made.driveline], {}, EffectPriors(NO_EFFECT))
+    age = concluded.estimates["te_delay"]
     assert age.value == pytest.approx(limit)
     assert age.verdict is Verdict.WEAK
     assert "the bound of the search; the log indicates a larger value" in age.reason
-    assert Code.AT_BOUND in [one.code for one in told.findings if one.subject == "te_delay"]
+    assert Code.AT_BOUND in [one.code for one in concluded.findings if one.subject == "te_delay"]
