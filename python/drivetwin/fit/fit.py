@@ -18,11 +18,12 @@ from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.fit.fixed_numbers import list_fixed, make_plain
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.plant import Plant
 from drivetwin.fit.recording import NetworkRecord, Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import search
 from drivetwin.fit.starts import drop_redundant_speeds, guess_start, list_starts
-from drivetwin.fit.term import NetworkTerm, Plant, Problem
+from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import (
     SoughtNumber,
     require_distinct_places,

@@ -21,8 +21,8 @@ from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.model_file import ModelChannels, format_model, read_model
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.plant import Plant
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
-from drivetwin.fit.term import Plant
 from drivetwin.fit.unknown import resolve_unknown
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import simulate
