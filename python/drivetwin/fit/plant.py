@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -46,9 +46,36 @@ class Plant:
             for keys, _, field, _ in iterate_numbers(one)
         }
 
+    @cached_property
+    def _targets(self) -> list[tuple[SoughtNumber, Place, float]]:
+        """Place and factor of each number that an unknown sets; that of a delay or a start is
+        `("delay", name)` or `("start", name)`."""
+        found = []
+        for one in self.sought:
+            for path, factor in one.factors.items():
+                head, _, name = path.partition(".")
+                is_number = head not in ("delay", "start")
+                place = self._places[path][0] if is_number else (head, name)
+                found.append((one, place, factor))
+        return found
+
+    def _iterate_numbers(self, point: ParameterVector) -> Iterator[tuple[Place, float]]:
+        """Yield place and value of each number that the unknowns set."""
+        for one, place, factor in self._targets:
+            coordinate = point[one.name]
+            value = exp(coordinate) if one.is_positive else coordinate
+            yield place, value if factor == 1.0 else factor * value
+
     def get_start_name(self, name: str) -> str:
         """Return the unknown of the start of a node or shaft."""
         return f"{self.label}.start.{name}" if self.label else f"start.{name}"
+
+    def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
+        """Return the delay [s] of each of `inputs` at `point`."""
+        sought = {
+            p[1]: float(number) for p, number in self._iterate_numbers(point) if p[0] == "delay"
+        }
+        return {name: sought.get(name, float(one.delay)) for name, one in inputs.items()}
 
     def list_undifferentiated(self) -> list[str]:
         """List the coordinates that act on numbers by which the core has no derivatives."""
@@ -77,20 +104,16 @@ class Plant:
         speeds, twists = dict(self.start.speeds), dict(self.start.twists)
         for name in self.own:
             (speeds if name in speeds else twists)[name] = point[self.get_start_name(name)]
-        for one in self.sought:
-            coordinate = point[one.name]
-            value = exp(coordinate) if one.is_positive else coordinate
-            for path, factor in one.factors.items():
-                number = value if factor == 1.0 else factor * value
-                head, _, rest = path.partition(".")
-                if head == "delay":
-                    signal = every[rest]
+        for place, number in self._iterate_numbers(point):
+            match place:
+                case "delay", str(name):
+                    signal = every[name]
                     assert isinstance(signal, Signal)
-                    every[rest] = replace(signal, delay=number)
-                elif head == "start":
-                    (speeds if rest in speeds else twists)[rest] = number
-                else:
-                    elements.put(self._places[path][0], number)
+                    every[name] = replace(signal, delay=number)
+                case "start", str(name):
+                    (speeds if name in speeds else twists)[name] = number
+                case _:
+                    elements.put(place, number)
         for fixed in self.fixed:
             x = point[fixed.coordinate]
             for place in fixed.places:

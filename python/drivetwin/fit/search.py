@@ -192,7 +192,7 @@ class _Attempts:
             return
         if found.normal.cost < self.rough:
             self.rough = found.normal.cost
-            self.weighted = self.problem.update_weighting(found.point)
+            self.weighted = self.weighted.update_weighting(found.point)
             self.starts = [self._weigh(one.point, one.iterations) for one in self.starts]
         self.starts.append(self._weigh(found.point, found.iterations))
 

@@ -39,13 +39,15 @@ class NetworkTerm:
     """One recording of a network.
 
     `returned` (n,) is G·(u - û): what the part of the inputs that is held back from the run would
-    do; 0 before the term is weighted by input noise.
+    do; 0 before the term is weighted by input noise. `quiet` (S,) are units of the states, kept
+    from the first of these weightings.
     """
 
     plant: Plant
     record: NetworkRecord
     weighting: Whitener
     returned: FloatArray | float = 0.0
+    quiet: FloatArray | None = None
 
     @classmethod
     def from_sensor_noise(cls, plant: Plant, record: NetworkRecord) -> Self:
@@ -154,7 +156,7 @@ class NetworkTerm:
         noise = {} if residual is None else self.weighting.estimate_input_noise(residual)
         if not noise:
             return self
-        record = self.record.subtract_noise(noise, self._get_delays(point))
+        record = self.record.subtract_noise(noise, self.plant.get_delays(point, self.record.inputs))
         return replace(self, record=record)._update_weighting(point) or self
 
     def _update_weighting(self, point: ParameterVector) -> Self | None:
@@ -180,13 +182,15 @@ class NetworkTerm:
             SeenOutput(rows[out.name], out.centre, _add_direct_noise(out, direct[out.name], power))
             for out in record.outputs
         ]
-        quiet = _compute_quiet_noise(response, seen)
+        quiet = self.quiet
+        if quiet is None:
+            quiet = _compute_quiet_noise(response, seen)
         try:
             sigma = np.concatenate([one.sigma for one in seen])
             weighting = add_input_noise(sigma, response, InputNoise(seen, power, quiet))
         except np.linalg.LinAlgError:
             return None
-        at_points = record.interpolate_held_back(self._get_delays(point))
+        at_points = record.interpolate_held_back(self.plant.get_delays(point, self.record.inputs))
         held_back = {name: 0.5 * (at_points[name][1:] + at_points[name][:-1]) for name in drive}
         z = response.propagate_inputs(held_back)
         columns = {
@@ -194,7 +198,7 @@ class NetworkTerm:
             + sum(own * at_points[of] for of, own in direct[name].items())
             for name, row in rows.items()
         }
-        return replace(self, weighting=weighting, returned=record.sample(columns))
+        return replace(self, weighting=weighting, returned=record.sample(columns), quiet=quiet)
 
     def _compute_response(self, point: ParameterVector) -> NetworkResponse | None:
         task = self.plant.build_task(point, self.record.inputs, self.record.time)
@@ -212,11 +216,6 @@ class NetworkTerm:
             between = float(np.median(np.diff(signal.time)))
             found[name] = self.record.input_sigma[name] ** 2 * between / response.step
         return found
-
-    def _get_delays(self, point: ParameterVector) -> Mapping[str, float]:
-        task = self.plant.build_task(point, self.record.inputs, self.record.time[:2])
-        inputs = {name: task.inputs[name] for name in self.record.inputs}
-        return {name: float(one.delay) for name, one in inputs.items() if isinstance(one, Signal)}
 
 
 Problem = LikelihoodObjective[NetworkTerm]
