@@ -9,11 +9,13 @@ use super::run::{Plan, RunOptions, SimulateError, join};
 use super::sensitivity::Scenario;
 use super::sets::Case;
 use super::start::State;
-use super::trajectory::{Column, Recorder, value};
+use super::trajectory::Recorder;
 use crate::model::Driveline;
 use crate::network::Network;
 use crate::number::{Dual, Number};
-use crate::solver::{Settings, Signal, SolverCache, Status};
+use crate::solver::{
+    Integrator, SampleRange, SampleSink, Samples, Settings, Signal, SolverCache, Status,
+};
 use std::sync::Arc;
 
 /// Columns of a pass.
@@ -47,11 +49,13 @@ pub fn respond(
     let (network, start) = case.promote::<Dual<LANES>>().compile()?;
     let signals: Vec<(&str, Signal<'_, Dual<LANES>>)> =
         scenario.signals.iter().map(|(name, signal)| (*name, signal.promote())).collect();
-    let settings = Settings { exponential_steps: false, ..settings };
     let options = RunOptions { settings, audit: false };
     let mut plan = Plan::new(&network, &signals, grid, outputs, options)?;
     plan.check_locks(&network, &start)?;
-    let inputs = join(&network, &signals, (grid[0], grid[grid.len() - 1]), grid)?;
+    let inputs = match plan.points {
+        Some(_) => (*plan.inputs).clone(),
+        None => join(&network, &signals, (grid[0], grid[grid.len() - 1]), grid)?,
+    };
     let (states, count) = (network.states(), network.mechanism.inputs.len());
     let steps = grid.len() - 1;
     let mut found = Response {
@@ -82,50 +86,76 @@ struct Pass<'a> {
 
 impl Pass<'_> {
     fn run(&self, start: &State<Dual<LANES>>, found: &mut Response) -> Result<(), Status> {
-        let (network, grid) = (self.network, &self.plan.grid);
-        let columns: Vec<_> =
-            self.plan.targets.iter().map(|&target| Column::of(network, target)).collect();
-        let mut unused = Recorder::new(network, &[], grid);
+        let (network, first) = (self.network, self.first);
         let x = self.plan.begin(network, start);
         let mut run = self.plan.integrator(SolverCache::new(network), x, &start.locked)?;
-        self.seed(&mut run.state.x);
-        let (mut next, mut entered, mut basis) = (1, true, Vec::new());
-        while let Some(step) = run.advance(&mut unused)? {
-            if entered {
-                run.state.expansion.basis_at(network, Dual::zero_(), &mut basis);
-                for (output, column) in columns.iter().enumerate() {
-                    let slopes = value(column, &run.state, &basis).eps;
-                    self.write_row(found, (next - 1) * columns.len() + output, &slopes);
-                }
-            }
-            let end = (step.start + step.length).re;
-            entered = grid.get(next).is_some_and(|&point| end >= point);
-            if entered {
-                for (state, x) in run.state.x.iter().enumerate() {
-                    self.write_step(found, (next - 1) * found.states + state, &x.eps);
-                }
-                self.seed(&mut run.state.x);
-                next += 1;
+        let recorder = Recorder::new(network, &self.plan.targets, &self.plan.grid);
+        let mut sink = Renewal { recorder, grid: &self.plan.grid, first, next: 0, found };
+        sink.begin_anew(&mut run.state.x);
+        while let Some(step) = run.advance(&mut sink)? {
+            sink.recorder.sample(&run, &step, run.is_at_end());
+            sink.reach((step.start + step.length).re, &mut run.state.x);
+        }
+        let Renewal { recorder, .. } = sink;
+        let (_, rows) = recorder.finish();
+        for (output, rows) in rows.iter().enumerate() {
+            for (k, slopes) in rows[..rows.len() - 1].iter().enumerate() {
+                let (states, row) = (found.states, k * self.plan.targets.len() + output);
+                write(&mut found.rows[row * states..(row + 1) * states], first, slopes);
             }
         }
         Ok(())
     }
+}
+
+/// Records outputs; at each point of the grid it stores the derivatives of the state and begins them anew.
+struct Renewal<'r, 'g> {
+    recorder: Recorder<'g, Dual<LANES>>,
+    grid: &'g [f64],
+    first: usize,
+    /// Next point of the grid.
+    next: usize,
+    found: &'r mut Response,
+}
+
+impl Renewal<'_, '_> {
+    /// Store the step that ends at a point of the grid, if `time` [s] is one.
+    fn reach(&mut self, time: f64, x: &mut [Dual<LANES>]) {
+        if self.grid.get(self.next).is_none_or(|&point| time < point) {
+            return;
+        }
+        let width = self.found.states + self.found.inputs;
+        for (state, number) in x.iter().enumerate() {
+            let row = (self.next - 1) * self.found.states + state;
+            write(&mut self.found.steps[row * width..(row + 1) * width], self.first, &number.eps);
+        }
+        self.begin_anew(x);
+    }
 
     /// Begin the derivatives anew.
-    fn seed(&self, x: &mut [Dual<LANES>]) {
+    fn begin_anew(&mut self, x: &mut [Dual<LANES>]) {
         for (state, number) in x.iter_mut().enumerate() {
             *number = variable(self.first, number.re, state);
         }
+        self.next += 1;
+    }
+}
+
+impl SampleSink<Dual<LANES>> for Renewal<'_, '_> {
+    const SAMPLES: usize = 1;
+
+    fn write_block(
+        &mut self,
+        run: &Integrator<'_, Dual<LANES>>,
+        active: &[usize],
+        samples: Samples<'_, Dual<LANES>>,
+        range: SampleRange,
+    ) {
+        self.recorder.write_block(run, active, samples, range);
     }
 
-    fn write_row(&self, found: &mut Response, row: usize, slopes: &[f64]) {
-        let states = found.states;
-        write(&mut found.rows[row * states..(row + 1) * states], self.first, slopes);
-    }
-
-    fn write_step(&self, found: &mut Response, row: usize, slopes: &[f64]) {
-        let width = found.states + found.inputs;
-        write(&mut found.steps[row * width..(row + 1) * width], self.first, slopes);
+    fn renew(&mut self, time: f64, x: &mut [Dual<LANES>]) {
+        self.reach(time, x);
     }
 }
 

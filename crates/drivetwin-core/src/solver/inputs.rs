@@ -253,9 +253,9 @@ impl<T: Real> Inputs<T> {
     }
 
     /// True if derivatives jump at knots. The derivative of a delayed signal by its delay follows the
-    /// slope, which changes at a knot.
+    /// slope, which changes at a knot; those by offsets begin anew there.
     pub fn jumps(&self) -> bool {
-        self.shifts.iter().any(|shift| !shift.is_constant())
+        !self.lifts.is_empty() || self.shifts.iter().any(|shift| !shift.is_constant())
     }
 
     /// Bounds of an input over a range of samples, without derivatives; zero where there
@@ -278,10 +278,14 @@ impl<T: Real> Inputs<T> {
         shifted(&self.lines(i)[input], self.shifts[input])
     }
 
-    /// Lines of every input.
+    /// Lines of every input, with their offsets.
     #[inline(always)]
     pub fn lines_at(&self, i: usize) -> impl Iterator<Item = [T; 2]> {
-        self.lines(i).iter().zip(&self.shifts).map(|(line, &shift)| shifted(line, shift))
+        let lifts = self.lifts.iter().copied().chain(std::iter::repeat(T::zero_()));
+        self.lines(i).iter().zip(&self.shifts).zip(lifts).map(|((line, &shift), lift)| {
+            let [start, rate] = shifted(line, shift);
+            [start + lift, rate]
+        })
     }
 
     /// Taylor coefficients of every input at `t` within segment `i`.

@@ -21,6 +21,9 @@ use std::sync::Arc;
 
 /// Consumer of the samples that fixed steps pass in one mode.
 pub trait SampleSink<T: Real> {
+    /// Most samples between calls of [`SampleSink::renew`].
+    const SAMPLES: usize = BLOCK;
+
     /// Samples of a range with the channels `active`; see [`Samples`].
     fn write_block(
         &mut self,
@@ -29,6 +32,11 @@ pub trait SampleSink<T: Real> {
         samples: Samples<'_, T>,
         range: SampleRange,
     );
+
+    /// Change the derivatives of the state `x` at a knot of the inputs, at `time` [s].
+    fn renew(&mut self, time: f64, x: &mut [T]) {
+        let _ = (time, x);
+    }
 }
 
 /// Samples that a run without derivatives passes before it looks at their guards.
@@ -160,7 +168,7 @@ impl<T: Real, S: SampleSink<T>, const N: usize, const A: usize> FixedStepRun<'_,
         let mut trail = SampleBuffer::in_columns(std::mem::take(&mut run.trail), A);
         let mut whole = true;
         while count > 0 && whole && !is_interrupted() {
-            let range = SampleRange { first: run.segment, count: count.min(BLOCK) };
+            let range = SampleRange { first: run.segment, count: count.min(S::SAMPLES) };
             let (steps, to) = (FixedSteps { range, h }, &mut trail);
             // Samples with derivatives are expensive, so guards are evaluated after each.
             let (passed, fallen) = if T::DERIVATIVES {
@@ -181,6 +189,9 @@ impl<T: Real, S: SampleSink<T>, const N: usize, const A: usize> FixedStepRun<'_,
             if fallen != 0 {
                 state.x = std::array::from_fn(|i| trail.states(i)[passed]);
                 whole = false;
+            }
+            if passed > 0 {
+                sink.renew(run.inputs.knot(run.segment), &mut state.x[..n]);
             }
         }
         run.state.x.copy_from_slice(&state.x[..n]);
