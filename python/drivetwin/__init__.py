@@ -17,7 +17,8 @@ it is first asked for, so that `import drivetwin` costs nothing.
     drivetwin.save_result(path, result)                           result.json
     drivetwin.save_report(path, result, log)                      report.html
 
-`DualClutch` and `simulate` are the model without a log, `Model` builds any driveline; all errors
+`DualClutch` and `simulate` are the model without a log. `Model` builds any driveline; its
+`fit` takes each `Recording` (of `Signal` and `Measured`) and the `Unknown` numbers. All errors
 derive from `DrivetwinError`.
 """
 
@@ -34,14 +35,17 @@ if TYPE_CHECKING:
     from drivetwin.estimation.result.method import Method
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_file import load_twin, save_twin
+    from drivetwin.fit.recording import Measured, Recording
+    from drivetwin.fit.unknown import Unknown
     from drivetwin.logs.arrays import read_arrays
     from drivetwin.logs.read import read_log
     from drivetwin.modeling.model import Model
+    from drivetwin.modeling.plates import Plates
     from drivetwin.pipeline import identify
     from drivetwin.report.html import save_report
     from drivetwin.shifts.detect import detect_shifts
     from drivetwin.simulation.driveline_run import simulate
-    from drivetwin.simulation.dual_clutch import DualClutch
+    from drivetwin.simulation.dual_clutch import DualClutch, Signal
     from drivetwin.twin.build import build_twin
     from drivetwin.twin.twin import Twin
     from drivetwin.validation.simulate_log import attach_validation, simulate_shift
@@ -53,9 +57,14 @@ register_presenter(lambda: import_module("drivetwin.report.notebook"))
 _HOME = {
     "DrivetwinError": ("errors", "DrivetwinError"),
     "DualClutch": ("simulation.dual_clutch", "DualClutch"),
-    "Model": ("modeling.model", "Model"),
+    "Measured": ("fit.recording", "Measured"),
     "Method": ("estimation.result.method", "Method"),
+    "Model": ("modeling.model", "Model"),
+    "Plates": ("modeling.plates", "Plates"),
+    "Recording": ("fit.recording", "Recording"),
+    "Signal": ("simulation.dual_clutch", "Signal"),
     "Twin": ("twin.twin", "Twin"),
+    "Unknown": ("fit.unknown", "Unknown"),
     "build_twin": ("twin.build", "build_twin"),
     "rank_experiments": ("estimation.analysis.experiment_design", "rank_experiments"),
     "detect_shifts": ("shifts.detect", "detect_shifts"),
@@ -77,9 +86,14 @@ _HOME = {
 __all__ = [
     "DrivetwinError",
     "DualClutch",
+    "Measured",
     "Method",
     "Model",
+    "Plates",
+    "Recording",
+    "Signal",
     "Twin",
+    "Unknown",
     "attach_validation",
     "build_twin",
     "detect_shifts",

@@ -11,12 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.read_options import RememberedMapping
+from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import (
     Estimate,
+    EstimatesMixin,
     FrictionCurve,
     LoadLaw,
     SignalFit,
@@ -173,7 +176,7 @@ class StageResults:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(DisplayMixin):
+class Identification(EstimatesMixin):
     """Everything one `identify` run found. Immutable; the twin, report and exports read it.
 
     `fit[signal][phase]` with signals `output_torque`, `input_speed`, `output_speed` and phases
@@ -214,6 +217,37 @@ class Identification(DisplayMixin):
     def has_own_friction(self, element: str) -> bool:
         """Return True if the log determines the friction of an element."""
         return element in self.friction and not self.friction[element].is_borrowed
+
+    def draw(self, count: int, *, seed: int = 0) -> dict[str, FloatArray]:
+        """Draw values of the parameters from their joint normal distribution.
+
+        Parameters
+        ----------
+        count
+            Number of draws.
+        seed
+            Seed of the draws.
+
+        Returns
+        -------
+        dict
+            Values (count,) by parameter id, SI; a column each for a pandas data frame.
+
+        Raises
+        ------
+        InputError
+            Where the method gives no joint covariance.
+        """
+        if self.joint is None:
+            what = f"the {self.method.value} method gives no joint covariance"
+            raise InputError(what, "identify the log by the likelihood method")
+        mean = [getattr(self.estimates.get(one), "value", None) for one in self.joint.ids]
+        known = np.array([value is not None for value in mean])
+        covariance = self.joint.covariance[np.ix_(known, known)]
+        center = np.array(mean)[known].astype(float)
+        drawn = np.random.default_rng(seed).multivariate_normal(center, covariance, count)
+        names = (one for one, is_known in zip(self.joint.ids, known, strict=True) if is_known)
+        return dict(zip(names, drawn.T, strict=True))
 
     def __repr__(self) -> str:
         known = sum(one.verdict is Verdict.IDENTIFIED for one in self.estimates.values())

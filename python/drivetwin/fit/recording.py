@@ -5,13 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.signal_processing import estimate_rounding_step
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import (
@@ -37,6 +39,10 @@ class Measured:
     time: FloatArray
     values: FloatArray
     sigma: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("time", "values"):  # lists and series are taken as well
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
 
     def get_noise(self) -> float:
         """Return the noise of a sample, at least that of an ideal sensor."""
@@ -66,6 +72,59 @@ class Recording:
     inputs: Mapping[str, Signal]
     outputs: Mapping[str, Measured]
     start: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Any,
+        inputs: Mapping[str, str] | Sequence[str],
+        outputs: Mapping[str, str] | Sequence[str],
+        start: Mapping[str, float] | None = None,
+    ) -> Self:
+        """Build a recording from the columns of a table, SI.
+
+        Parameters
+        ----------
+        frame
+            pandas data frame, or dictionary of arrays (n,). Its column `time`, or else the index of
+            the data frame, is the time [s]. A channel has no sample where its value is NaN.
+        inputs, outputs
+            Columns by the name that the network gives the quantity, or columns of that name.
+        start
+            Known start, as in the class.
+
+        Raises
+        ------
+        InputError
+            For a column that the table does not have.
+        """
+        columns = {str(name): np.asarray(frame[name], dtype=np.float64) for name in frame}
+        time = columns.get("time", np.asarray(getattr(frame, "index", ()), dtype=np.float64))
+        if not time.size:
+            raise InputError("the table has no column 'time'", "add the time [s] of each row")
+        read = partial(_read_column, columns, time)
+        signals = {name: Signal(*read(column)) for name, column in _name_columns(inputs).items()}
+        measured = {name: Measured(*read(one)) for name, one in _name_columns(outputs).items()}
+        return cls(signals, measured, start or {})
+
+
+def _name_columns(stated: Mapping[str, str] | Sequence[str]) -> dict[str, str]:
+    """Return columns by the name of the quantity."""
+    return dict(stated) if isinstance(stated, Mapping) else {one: one for one in stated}
+
+
+def _read_column(
+    columns: Mapping[str, FloatArray], time: FloatArray, name: str
+) -> tuple[FloatArray, FloatArray]:
+    """Read the times (n,) [s] and values (n,) of the samples of a column.
+
+    Raises InputError for a column that is missing.
+    """
+    if name not in columns:
+        what = f"the table has no column {name!r}{suggest_spelling(name, columns)}"
+        raise InputError(what, "name a column of the table")
+    shown = np.isfinite(columns[name])
+    return time[shown], columns[name][shown]
 
 
 @dataclass(frozen=True, eq=False)

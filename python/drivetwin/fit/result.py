@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.estimation.likelihood.coloured_noise import split_whitened
 from drivetwin.estimation.likelihood.diagnostics.identifiability import report_null_directions
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
@@ -19,7 +20,7 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
-from drivetwin.estimation.result.estimate import Z95, Estimate, SignalFit, Verdict
+from drivetwin.estimation.result.estimate import Z95, Estimate, EstimatesMixin, SignalFit, Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.prior_conflict import PRIOR
 from drivetwin.estimation.result.verdict import (
@@ -143,8 +144,8 @@ class MovedNumber:
         return report(code, one.name, found=found, stated=stated)
 
 
-@dataclass(frozen=True, eq=False)
-class ModelFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModelFit(EstimatesMixin):
     """Result of a fit.
 
     `estimates` by name of the unknown; `intervals` are their 95 % intervals, those of a positive
@@ -230,9 +231,58 @@ class ModelFit:
             unknowns=unknowns,
         )
 
-    def simulate(self) -> tuple[NetworkRun, ...]:
-        """Simulate every recording at the minimum, on its grid."""
-        return tuple(term.simulate(self.minimum.point) for term in self.problem.terms)
+    def __repr__(self) -> str:
+        known = sum(one.verdict is Verdict.IDENTIFIED for one in self.estimates.values())
+        share = f"{known} of {len(self.estimates)} unknowns identified"
+        return f"<ModelFit of {self.model.name!r}: {self.status.value}, {share}>"
+
+    def simulate(self, changed: Mapping[str, float] | None = None) -> tuple[NetworkRun, ...]:
+        """Simulate every recording, on its grid.
+
+        Parameters
+        ----------
+        changed
+            Values that replace those at the minimum, by name of the unknown, SI.
+
+        Raises
+        ------
+        InputError
+            For a name that is no unknown.
+        """
+        given, values = dict(changed or {}), self.minimum.point.values.copy()
+        for k, one in enumerate(self.sought):
+            if one.name in given:
+                values[k] = one.to_coordinate(given.pop(one.name))
+        for name in given:
+            what = f"{name!r} is no unknown of the fit{suggest_spelling(name, self.estimates)}"
+            raise InputError(what, f"use {', '.join(self.estimates)}")
+        point = self.minimum.point.replace_values(values)
+        return tuple(term.simulate(point) for term in self.problem.terms)
+
+    def draw(self, count: int, *, seed: int = 0) -> dict[str, FloatArray]:
+        """Draw values of the unknowns from their joint distribution.
+
+        It is normal in the coordinates: the logarithm of a number that is positive.
+
+        Parameters
+        ----------
+        count
+            Number of draws.
+        seed
+            Seed of the draws.
+
+        Returns
+        -------
+        dict
+            Values (count,) by name of the unknown, SI; a column each for a pandas data frame.
+        """
+        size = len(self.sought)
+        center, covariance = self.minimum.point.values[:size], self.covariance[:size, :size]
+        drawn = np.random.default_rng(seed).multivariate_normal(center, covariance, count).T
+        return {
+            one.name: np.exp(column) if one.is_positive else column
+            for one, column in zip(self.sought, drawn, strict=True)
+        }
 
 
 def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMinimum) -> ModelFit:

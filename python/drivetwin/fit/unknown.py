@@ -54,6 +54,13 @@ class Unknown:
     ] = (None, None)
     paths: Mapping[str, float] | Sequence[str] | None = None
 
+    @classmethod
+    def read(cls, stated: Unknown | tuple[float, float] | float) -> Unknown:
+        """Return an unknown from a first guess, or from a value with its standard deviation."""
+        if isinstance(stated, Unknown):
+            return stated
+        return cls(*stated) if isinstance(stated, Sequence) else cls(stated)
+
     def get_factors(self, name: str) -> dict[str, float]:
         """Return the factor of each path of the unknown with this name."""
         if self.paths is None:

@@ -222,7 +222,7 @@ class Model(ElementMethods):
     def fit(
         self,
         recordings: Recording | Sequence[Recording],
-        unknowns: Mapping[str, Unknown],
+        unknowns: Mapping[str, Unknown | tuple[float, float] | float],
         outputs: Mapping[str, Output],
         *,
         tolerances: Mapping[str, Tolerance] | None = None,
@@ -237,7 +237,8 @@ class Model(ElementMethods):
             and twists of the model are first guesses unless a recording states them.
         unknowns
             By path, such as `shaft.stiffness`, `B3.friction.mu_c`, `delay.torque`; or by any name
-            with the paths that share it.
+            with the paths that share it. A number is a first guess, a pair is value and standard
+            deviation.
         outputs
             Quantity that each measured output is, by its name in the recordings.
         tolerances
@@ -264,7 +265,7 @@ class Model(ElementMethods):
 
     def describe(
         self,
-        unknowns: Mapping[str, Unknown],
+        unknowns: Mapping[str, Unknown | tuple[float, float] | float],
         outputs: Mapping[str, Output],
         tolerances: Mapping[str, Tolerance] | None = None,
     ) -> NetworkModel:
@@ -275,7 +276,8 @@ class Model(ElementMethods):
         """
         elements = [component.element for component in self.components]
         start, known = self._resolve_start(), tolerances or {}
-        return NetworkModel(self.name, elements, self.inputs, start, outputs, unknowns, known)
+        sought = {name: Unknown.read(one) for name, one in unknowns.items()}
+        return NetworkModel(self.name, elements, self.inputs, start, outputs, sought, known)
 
     def list_outputs(self) -> list[Output]:
         """List everything that a run records."""

@@ -10,8 +10,7 @@ from typing import Any
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import MissingExtraError
-from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.estimate import Estimate
+from drivetwin.estimation.result.estimate import Estimate, EstimatesMixin, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.twin.twin import Twin
 
@@ -33,8 +32,16 @@ def _(log: ShiftLog) -> Any:
 
 
 @make_frame.register
-def _(found: Identification) -> Any:
+def _(found: EstimatesMixin) -> Any:
     return _tabulate_estimates(found.estimates)
+
+
+@make_frame.register
+def _(curve: FrictionCurve) -> Any:
+    """μ and its 95 % band over the slip [rad/s]."""
+    columns = {"mu": curve.mu, "low": curve.mu_lo, "high": curve.mu_hi}
+    frame = import_pandas().DataFrame(columns, index=curve.slip)
+    return frame.rename_axis("slip")
 
 
 @make_frame.register

@@ -30,6 +30,7 @@ from drivetwin.report.blocks import (
     VerdictBlock,
     make_table,
 )
+from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.html import render_page
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
@@ -58,7 +59,7 @@ def render_fit(
 ) -> str:
     """HTML text of the page; equal fits give equal text."""
     terms = zip(logs, found.problem.terms, found.simulate(), strict=True)
-    figures = [_build_figure(log, term, run) for log, term, run in terms]
+    figures = [FigureBlock(plot_recording(term, run), f"{log}.") for log, term, run in terms]
     sections = [
         Section("result", "Result", "", [_build_verdict(found), *_build_parameters(found)]),
         build_findings_section((*remarks, *found.findings)),
@@ -136,7 +137,7 @@ def _build_fixed_row(one: MovedNumber) -> tuple[str, ...]:
     return number.name, *texts, display.label, str(number.source), widened
 
 
-def _build_figure(log: str, term: NetworkTerm, run: NetworkRun) -> FigureBlock:
+def plot_recording(term: NetworkTerm, run: NetworkRun) -> Figure:
     """Draw the outputs of a recording, measured and simulated, and the inputs below."""
     panels = []
     for out in term.record.outputs:
@@ -151,8 +152,7 @@ def _build_figure(log: str, term: NetworkTerm, run: NetworkRun) -> FigureBlock:
         quantity = find_input_quantity(name, term.plant.elements)
         panels.append(Panel(name, _get_display(quantity), [curve], weight=0.6))
     view = (float(run.time[0]), float(run.time[-1]))
-    figure = plot_over_time_axis(panels, view, _HEIGHT * len(panels))
-    return FigureBlock(figure, f"{log}.")
+    return plot_over_time_axis(panels, view, _HEIGHT * len(panels))
 
 
 def _get_display(quantity: Quantity) -> Display:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures and summaries of results for notebooks: what `DisplayMixin` objects answer with."""
+"""Figures and summaries of results for notebooks, used by `DisplayMixin`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ import numpy as np
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.fit.result import ModelFit
 from drivetwin.report.blocks import Block, TextBlock, make_table
 from drivetwin.report.brief import build_identification_blocks
 from drivetwin.report.data_frames import make_frame
@@ -21,12 +23,15 @@ from drivetwin.report.figures.comparison import plot_friction_overlay
 from drivetwin.report.figures.parameters import plot_intervals
 from drivetwin.report.figures.recording import QUANTITIES, plot_log
 from drivetwin.report.figures.validation import plot_validation
+from drivetwin.report.fit import build_fit_blocks, plot_recording
 from drivetwin.report.html import render_fragment
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_parameter_blocks
+from drivetwin.report.sections.summary import build_friction_table
 from drivetwin.report.text import format_blocks
 from drivetwin.twin.twin import Twin
+from drivetwin.validation.validated_model import ValidatedModel
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -87,6 +92,22 @@ def _(found: Identification) -> Figure:
 
 
 @_plot.register
+def _(model: ValidatedModel) -> Figure:
+    return _plot(model.result)
+
+
+@_plot.register
+def _(found: ModelFit) -> Figure:
+    """Draw the first recording."""
+    return plot_recording(found.problem.terms[0], found.simulate()[0])
+
+
+@_plot.register
+def _(curve: FrictionCurve) -> Figure:
+    return plot_friction_overlay("the element", {"μ": curve}, ["μ"])
+
+
+@_plot.register
 def _(twin: Twin) -> Figure:
     return plot_friction_overlay("the element", twin.friction, list(twin.friction))
 
@@ -114,6 +135,22 @@ def _(found: Identification) -> Summary:
     shifts = ", ".join(one.name for one in found.shifts)
     title = f"{', '.join(found.inputs)}: shift {shifts}, {found.method.value} method"
     return Summary(title, build_identification_blocks(found))
+
+
+@summarise.register
+def _(model: ValidatedModel) -> Summary:
+    return summarise(model.result)
+
+
+@summarise.register
+def _(found: ModelFit) -> Summary:
+    logs = [term.label or "recording" for term in found.problem.terms]
+    return Summary(f"Fit of {found.model.name}", build_fit_blocks(found, logs, {}))
+
+
+@summarise.register
+def _(curve: FrictionCurve) -> Summary:
+    return Summary("Friction curve", [build_friction_table({"μ": curve})])
 
 
 @summarise.register

@@ -208,6 +208,8 @@ class Signal:
 
     def __post_init__(self) -> None:
         require_samples(self.time, self.values, self.delay)
+        for name in ("time", "values"):  # lists and series are taken as well
+            object.__setattr__(self, name, as_array(getattr(self, name)))
 
     @property
     def arrival(self) -> FloatArray:

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.rich_display import DisplayMixin
+from drivetwin.errors import suggest_spelling
 from drivetwin.parameters import ParameterSpec, get_parameter_spec
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck
 from drivetwin.vehicle.spec import Z95 as Z95  # the place where results look it up
@@ -75,8 +78,24 @@ class Estimate:
         return self._compute_interval(self.std_total)
 
 
+class EstimatesMixin(DisplayMixin):
+    """Base of results whose items are estimates by parameter id: `result["eta"]`."""
+
+    estimates: Mapping[str, Estimate]
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Return the estimate of a parameter. Raises KeyError that suggests a spelling."""
+        if name not in self.estimates:
+            raise KeyError(f"no parameter {name!r}{suggest_spelling(name, self.estimates)}")
+        return self.estimates[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the parameter ids."""
+        return iter(self.estimates)
+
+
 @dataclass(frozen=True, eq=False)
-class FrictionCurve:
+class FrictionCurve(DisplayMixin):
     """μ over |slip| of one element, over the slip range seen; arrays (n,), slip in rad/s.
 
     `mu_lo`, `mu_hi` bound the 95 % band (total). `points_slip`, `points_mu` are the raw points
