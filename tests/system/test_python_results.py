@@ -8,10 +8,10 @@ import pytest
 
 import drivetwin
 from drivetwin.errors import InputError
-from drivetwin.fit.synthesize import ModelName
 from drivetwin.validation.validated_model import ValidatedModel
 from tests.estimation.asked import record_log, stepped
-from tests.support.fits import TWO_SIDED, fit_log, make_two_sided, record_two_sided
+from tests.support.arrays import FloatArray
+from tests.support.fits import TWO_SIDED, make_two_sided, record_two_sided
 
 DRAWS = 4000
 
@@ -49,37 +49,37 @@ def test_a_heavier_vehicle_gains_less_speed() -> None:
         model.simulate(log, J_wheel=1.0)
 
 
-def test_a_fit_simulates_other_values_and_draws_positive_numbers() -> None:
-    found = fit_log(ModelName.TIP_IN)
-    assert "valid" in repr(found)
-    name = next(iter(found))
-    (usual,), (other,) = found.simulate(), found.simulate({name: 2.0 * found.values[name]})
-    output = next(iter(found.problem.terms[0].plant.outputs.values()))
-    assert not np.allclose(usual.columns[output], other.columns[output], rtol=1e-3)
-    column = found.draw(DRAWS)[name]
-    assert np.all(column > 0.0)
-    assert np.std(np.log(column)) == pytest.approx(found.std[name] / found.values[name], rel=0.06)
-    with pytest.raises(InputError, match="no unknown"):
-        found.simulate({"shaft": 1.0})
-
-
-def test_a_table_with_gaps_becomes_a_recording_that_a_fit_takes() -> None:
+def _record_table() -> dict[str, FloatArray]:
     made = record_two_sided()
     torque, motor, left = made.inputs["torque"], made.outputs["motor"], made.outputs["left"]
-    columns = {"time": torque.time, "T": torque.values, "motor": motor.values.copy()}
-    columns |= {"w_left": left.values}
-    columns["motor"][3::2] = np.nan
+    speed = motor.values.copy()
+    speed[3::2] = np.nan
+    return {"time": torque.time, "T": torque.values, "motor": speed, "w_left": left.values}
+
+
+def test_a_fit_of_a_table_with_gaps_draws_and_simulates_other_values() -> None:
     recording = drivetwin.Recording.from_frame(
-        columns, {"torque": "T"}, {"motor": "motor", "left": "w_left"}
+        _record_table(), {"torque": "T"}, {"motor": "motor", "left": "w_left"}
     )
-    assert recording.outputs["motor"].time.size == (torque.time.size + 3) // 2
+    time = recording.outputs["left"].time
+    assert recording.outputs["motor"].time.size == (time.size + 3) // 2
     found = make_two_sided()[0].fit(
         recording, {"left.stiffness": (450.0, 100.0), "motor.inertia": 0.12}, TWO_SIDED
     )
     for name, truth in {"left.stiffness": 400.0, "motor.inertia": 0.1}.items():
         assert abs(found.values[name] - truth) < 3.5 * found.std[name], name
-    with pytest.raises(InputError, match="no column 'Tq'"):
-        drivetwin.Recording.from_frame(columns, {"torque": "Tq"}, ["motor"])
+        column = found.draw(DRAWS)[name]
+        assert np.std(np.log(column)) == pytest.approx(found.std[name] / truth, rel=0.07)
+    (usual,), (other,) = found.simulate(), found.simulate({"motor.inertia": 5.0})
+    swings = [np.std(run.columns["speed", "motor"]) for run in (usual, other)]
+    assert swings[1] < 0.6 * swings[0]
+    with pytest.raises(InputError, match="no unknown"):
+        found.simulate({"shaft": 1.0})
+
+
+def test_a_column_that_a_table_lacks_is_named() -> None:
+    with pytest.raises(InputError, match="no column 'w_left_'; did you mean 'w_left'"):
+        drivetwin.Recording.from_frame(_record_table(), ["T"], ["w_left_"])
 
 
 def test_lists_and_data_frames_are_taken_as_arrays() -> None:
