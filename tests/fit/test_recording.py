@@ -47,7 +47,7 @@ def test_noise_is_estimated_unless_it_is_stated() -> None:
     recording = make_recording()
     record = build_network_record(recording, ["w"], {})
     assert record.sigma[0] == pytest.approx(0.2, rel=0.1)
-    assert record.input_sigma["T"] == pytest.approx(0.4, rel=0.1)
+    assert np.sqrt(record.input_variance["T"]) == pytest.approx(0.4, rel=0.1)
     stated = replace(recording, outputs={"w": replace(recording.outputs["w"], sigma=0.7)})
     assert build_network_record(stated, ["w"], {}).sigma[0] == 0.7
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Self
@@ -21,7 +21,13 @@ from drivetwin.estimation.likelihood.data.input_smoothing import (
     smooth_windows,
 )
 from drivetwin.estimation.likelihood.data.output import ComparedOutputs, Output
-from drivetwin.estimation.likelihood.data.shift_record import RECORD, average_at_samples, fill_grid
+from drivetwin.estimation.likelihood.data.sample_noise import (
+    Quantization,
+    average_at_samples,
+    estimate_quantization,
+    spread_over_steps,
+)
+from drivetwin.estimation.likelihood.data.shift_record import RECORD, fill_grid
 from drivetwin.simulation.dual_clutch import Signal
 
 _MIN_SAMPLES = 20
@@ -52,6 +58,17 @@ class Measured:
             rounding = float(estimate_rounding_step(self.values)) / np.sqrt(12.0)
             found = max(estimate_white_noise(self.values), rounding)
         return float(max(found, least, np.finfo(float).tiny))
+
+    def compute_variance(self) -> FloatArray:
+        """Compute the variance (n,) of white samples with the power of noise and rounding."""
+        rounding = self.find_rounding()
+        own = np.full(self.values.size, self.get_noise() ** 2)
+        return own if rounding is None else own + rounding.sigma**2
+
+    def find_rounding(self) -> Quantization | None:
+        """Find the rounding of the samples; None where noise dithers it."""
+        signal = MeasuredSignal(self.time, self.values, self.get_noise())
+        return estimate_quantization(signal, estimate_rounding_step(self.values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,14 +150,14 @@ class NetworkRecord(ComparedOutputs):
 
     `time` (N,) is the grid of the simulation: every instant at which an output was sampled.
     `inputs` drive the simulation: the values as read less `held_back`, of which `fast` is the part
-    that local cubics over `windows` samples take off; `input_sigma` is the white noise of their
-    samples.
+    that local cubics over `windows` samples take off; `input_variance` (m,) is that of white
+    samples with the power of their noise and rounding.
     """
 
     time: FloatArray
     outputs: tuple[Output, ...]
     inputs: Mapping[str, Signal]
-    input_sigma: Mapping[str, float]
+    input_variance: Mapping[str, FloatArray]
     held_back: Mapping[str, FloatArray]
     fast: Mapping[str, FloatArray]
     windows: Mapping[str, NDArray[np.intp]]
@@ -159,22 +176,22 @@ class NetworkRecord(ComparedOutputs):
         time = np.unique(np.concatenate([self.time[:1], *stamps]))
         outputs = tuple(
             replace(
-                out,
+                out.select(slice(None, None, every)),
                 place=(place := np.searchsorted(time, own)),
                 centre=place,
-                values=out.values[::every],
             )
             for out, own in zip(self.outputs, stamps, strict=True)
         )
-        inputs, sigma, held_back = {}, {}, {}
+        inputs, variance, held_back = {}, {}, {}
         for name, signal in self.inputs.items():
             step = float(np.median(np.diff(signal.time)))
             size = max(round(float(np.median(np.diff(time))) / step), 1)
             inputs[name] = _average_blocks(signal, size)
-            sigma[name] = self.input_sigma[name] / float(np.sqrt(size))
+            power = replace(signal, values=self.input_variance[name])
+            variance[name] = _average_blocks(power, size).values / size
             held_back[name] = np.zeros(inputs[name].values.size)
         windows = {name: np.ones(one.size, dtype=np.intp) for name, one in held_back.items()}
-        return NetworkRecord(time, outputs, inputs, sigma, held_back, held_back, windows)
+        return NetworkRecord(time, outputs, inputs, variance, held_back, held_back, windows)
 
     def subtract_noise(
         self, noise: Mapping[str, FloatArray], delays: Mapping[str, float]
@@ -190,6 +207,17 @@ class NetworkRecord(ComparedOutputs):
             held_back[name] = self.fast[name] + own
             inputs[name] = replace(signal, values=read - held_back[name])
         return replace(self, inputs=inputs, held_back=held_back)
+
+    def compute_power(
+        self, names: Collection[str], delays: Mapping[str, float]
+    ) -> dict[str, FloatArray]:
+        """Compute the variance (N-1,) of the noise of some inputs over each step, by name."""
+        return {
+            name: spread_over_steps(
+                self.time, self.inputs[name].time + delays[name], self.input_variance[name]
+            )
+            for name in names
+        }
 
     def interpolate_held_back(self, delays: Mapping[str, float]) -> dict[str, FloatArray]:
         """Compute the held-back part of each input (N,) at the points of the grid."""
@@ -251,13 +279,19 @@ def build_network_record(
     between = [float(np.median(np.diff(one.time))) for one in inputs.values()]
     time = fill_grid(stamps, max(min(between, default=RECORD.grid_step), RECORD.grid_step))
     samples = tuple(
-        Output(name, np.searchsorted(time, one.time), one.values, one.get_noise())
+        Output(
+            name,
+            np.searchsorted(time, one.time),
+            one.values,
+            one.get_noise(),
+            rounding=one.find_rounding(),
+        )
         for name, one in compared.items()
     )
-    sigma = {name: Measured(one.time, one.values).get_noise() for name, one in inputs.items()}
+    read = {name: Measured(one.time, one.values) for name, one in inputs.items()}
     windows = {
-        name: select_windows(MeasuredSignal(one.time, one.values, sigma[name]))
-        for name, one in inputs.items()
+        name: select_windows(MeasuredSignal(one.time, one.values, one.get_noise()))
+        for name, one in read.items()
     }
     smooth = {name: smooth_windows(one.values, windows[name]) for name, one in inputs.items()}
     fast = {name: one.values - smooth[name] for name, one in inputs.items()}
@@ -265,7 +299,7 @@ def build_network_record(
         time,
         samples,
         {name: replace(one, values=smooth[name]) for name, one in inputs.items()},
-        sigma,
+        {name: one.compute_variance() for name, one in read.items()},
         fast,
         fast,
         windows,

@@ -169,7 +169,8 @@ class NetworkTerm:
         if not response.finite:
             return None
         rows = {name: found.rows[output] for name, output in self.plant.outputs.items()}
-        power = self._compute_power(response)
+        delays = self.plant.get_delays(point, record.inputs)
+        power = record.compute_power(drive, delays)
         direct = {  # derivatives (N,) by prescribed speeds
             name: {
                 of: np.einsum("ks,ks->k", row, one)
@@ -190,7 +191,7 @@ class NetworkTerm:
             weighting = add_input_noise(sigma, response, InputNoise(seen, power, quiet))
         except np.linalg.LinAlgError:
             return None
-        at_points = record.interpolate_held_back(self.plant.get_delays(point, self.record.inputs))
+        at_points = record.interpolate_held_back(delays)
         held_back = {name: 0.5 * (at_points[name][1:] + at_points[name][:-1]) for name in drive}
         z = response.propagate_inputs(held_back)
         columns = {
@@ -208,15 +209,6 @@ class NetworkTerm:
         except InputError:
             return None
 
-    def _compute_power(self, response: LinearResponse) -> dict[str, FloatArray]:
-        """Compute the variance (N-1,) of an input's noise over each step, by name."""
-        found = {}
-        for name in response.drive:
-            signal = self.record.inputs[name]
-            between = float(np.median(np.diff(signal.time)))
-            found[name] = self.record.input_sigma[name] ** 2 * between / response.step
-        return found
-
 
 Problem = LikelihoodObjective[NetworkTerm]
 
@@ -226,7 +218,7 @@ def _add_direct_noise(
 ) -> FloatArray:
     """Compute the noise (n,) of the samples of an output: of its sensor, and of the inputs of which
     it is a function without delay."""
-    variance = np.full(out.values.size, out.sigma**2)
+    variance = out.noise**2
     for name, slope in direct.items():
         of_input = np.append(power[name], power[name][-1:])
         variance += (slope**2 * of_input)[out.centre]

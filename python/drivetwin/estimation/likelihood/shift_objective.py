@@ -10,6 +10,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError, SimulationError
+from drivetwin.estimation.likelihood.data.sample_noise import spread_over_steps
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.noise.residual_covariance import (
     InputNoise,
@@ -64,14 +65,12 @@ def weight_by_inputs(model: DualClutch, record: ShiftRecord, response: ShiftResp
 
 def _compute_power(record: ShiftRecord, response: ShiftResponse) -> dict[str, FloatArray]:
     """Compute the variance (N-1,) of an input's noise, constant over each step, by name."""
-    found = {}
-    middle = 0.5 * (record.time[1:] + record.time[:-1])
-    for name in response.drive:
-        signal = record.engine_torque if name == TORQUE else record.pressures[name]
-        between = float(np.median(np.diff(signal.time)))
-        variance = np.interp(middle, signal.time, record.compute_variance(name))
-        found[name] = variance * between / response.step
-    return found
+    stamps = {name: one.time for name, one in record.pressures.items()}
+    stamps[TORQUE] = record.engine_torque.time
+    return {
+        name: spread_over_steps(record.time, stamps[name], record.compute_variance(name))
+        for name in response.drive
+    }
 
 
 def _compute_sensor_noise(model: DualClutch, record: ShiftRecord) -> FloatArray:

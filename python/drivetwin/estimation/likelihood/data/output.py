@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.data.sample_noise import Quantization
 
 IndexArray = NDArray[np.intp]
 
@@ -17,6 +19,7 @@ IndexArray = NDArray[np.intp]
 class Output:
     """A compared signal: `values` (n,) stamped at the points `place` (n,) of the record's grid.
 
+    `sigma` is the white noise of a sample, `rounding` are errors that this noise does not dither.
     With a `window` [s] a sample is the mean over that time before its stamp, as encoders on a bus
     send it. `centre` (n,) are the points in the middle of what a sample shows.
     """
@@ -27,6 +30,7 @@ class Output:
     sigma: float
     window: float = 0.0
     centre: IndexArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    rounding: Quantization | None = None
 
     def __post_init__(self) -> None:
         """Without a window the middle is the stamp."""
@@ -35,10 +39,24 @@ class Output:
 
     def cut(self, count: int) -> Output:
         """Keep the samples stamped within the first `count` points of the grid."""
-        keep = int(np.searchsorted(self.place, count))
+        return self.select(slice(int(np.searchsorted(self.place, count))))
+
+    def select(self, kept: slice) -> Output:
+        """Keep the samples in a slice."""
         return replace(
-            self, place=self.place[:keep], values=self.values[:keep], centre=self.centre[:keep]
+            self,
+            place=self.place[kept],
+            values=self.values[kept],
+            centre=self.centre[kept],
+            rounding=self.rounding and self.rounding.select(kept),
         )
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard deviation (n,) of white noise with the power of a sample's own and of its
+        rounding."""
+        rounding = 0.0 if self.rounding is None else self.rounding.sigma
+        return np.full(self.values.size, np.hypot(self.sigma, rounding))
 
     def get_period(self, time: FloatArray) -> float:
         """Return the sampling time [s]."""
@@ -48,9 +66,7 @@ class Output:
         """Keep the samples stamped a period or more after the grid `time` (N,) starts: point
         samples and means are then both defined on it."""
         first = int(np.searchsorted(time[self.place], time[0] + self.get_period(time)))
-        return replace(
-            self, place=self.place[first:], values=self.values[first:], centre=self.centre[first:]
-        )
+        return self.select(slice(first, None))
 
     def convert_to_means(self, time: FloatArray) -> Output:
         """Interpret the samples as means over the time since the previous one."""
@@ -97,10 +113,10 @@ class ComparedOutputs:
         """Number of compared samples."""
         return sum(out.values.size for out in self.outputs)
 
-    @property
+    @cached_property
     def sigma(self) -> FloatArray:
         """Standard deviation of each compared sample (size,)."""
-        return np.concatenate([np.full(out.values.size, out.sigma) for out in self.outputs])
+        return np.concatenate([out.noise for out in self.outputs])
 
     @property
     def measured(self) -> FloatArray:

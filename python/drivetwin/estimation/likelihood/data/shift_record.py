@@ -1,12 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Data of one shift for the fit: simulation inputs and the compared outputs.
-
-Quantization errors are noise of an input that its own noise does not dither. While a torque or
-pressure stays at a level the error stays too: its mean over that time is as far
-off as one sample, and noise of the same size that comes and goes from sample to sample would be far
-less. Each stay has an error of its own, so what it does is that of white noise of the same power
-there.
-"""
+"""Data of one shift for the fit: simulation inputs and the compared outputs."""
 
 from __future__ import annotations
 
@@ -14,13 +7,11 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals, TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.input_smoothing import (
     compute_bend,
@@ -29,42 +20,16 @@ from drivetwin.estimation.likelihood.data.input_smoothing import (
     smooth_pressure,
 )
 from drivetwin.estimation.likelihood.data.output import ComparedOutputs, Output
+from drivetwin.estimation.likelihood.data.sample_noise import (
+    Quantization,
+    average_at_samples,
+    build_interpolation,
+    estimate_quantization,
+)
 from drivetwin.simulation import network
 from drivetwin.simulation.driveline_run import COMPARED
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal, Trajectory
 from drivetwin.vehicle.spec import PriorValue
-
-
-@dataclass(frozen=True, eq=False)
-class Quantization:
-    """Errors of the samples of a rounded signal that do not average out.
-
-    `error` is the standard deviation of the mean error of one stay at a level, in the signal's
-    unit; `stay` (m,) the number of the stay that each sample belongs to, from 0.
-    """
-
-    error: float
-    stay: NDArray[np.intp]
-
-    @property
-    def sigma(self) -> FloatArray:
-        """White noise (m,) of the samples with the same power: its mean over a stay is `error`."""
-        return np.asarray(self.error * np.sqrt(np.bincount(self.stay)[self.stay]))
-
-    def draw(self, rng: np.random.Generator) -> FloatArray:
-        """Draw random errors (m,)."""
-        return np.asarray(self.error * rng.standard_normal(int(self.stay[-1]) + 1)[self.stay])
-
-
-def estimate_quantization(signal: MeasuredSignal, step: float) -> Quantization | None:
-    """Compute the errors that quantization to `step` leaves, in the signal's unit; None if noise
-    dithers them."""
-    error = estimate_quantization_error(signal, step)
-    if error == 0.0:
-        return None
-    level = np.round(smooth_adaptive(signal) / step)
-    return Quantization(error, np.cumsum(np.diff(level, prepend=level[0]) != 0.0))
-
 
 TORQUE = ENGINE_TORQUE
 """Name of the engine torque among the inputs; the others are pressures by element."""
@@ -230,7 +195,7 @@ class ShiftRecord(ComparedOutputs):
             return None
         middle = 0.5 * (self.time[1:] + self.time[:-1])
         torque = self.engine_torque.time
-        by_step = _build_interpolation(torque, middle, (0, torque.size))
+        by_step = build_interpolation(torque, middle, (0, torque.size))
         return csr_array(by_step @ self._build_torque_map(self.of_speeds))
 
     def map_torque_noise(self, noise: FloatArray) -> FloatArray:
@@ -249,7 +214,7 @@ class ShiftRecord(ComparedOutputs):
             if out.name == "engine_speed":
                 break
             first += out.values.size
-        of_speed = _build_interpolation(self.time[out.place], torque, (first, self.size))
+        of_speed = build_interpolation(self.time[out.place], torque, (first, self.size))
         return csr_array(of_speed * slope[:, None])
 
     def compute_torque_rate(self, delay: float) -> FloatArray:
@@ -365,31 +330,6 @@ def fill_grid(time: FloatArray, step: float = RECORD.grid_step) -> FloatArray:
     wide = np.flatnonzero(np.diff(time) > RECORD.max_grid_gap * step)
     steps = [np.arange(time[k] + step, time[k + 1] - 0.5 * step, step) for k in wide]
     return np.sort(np.concatenate([time, *steps]))
-
-
-def average_at_samples(grid: FloatArray, steps: FloatArray, stamps: FloatArray) -> FloatArray:
-    """Compute the noise of samples at `stamps` (m,) from that over each step of `grid` (N-1,).
-
-    A sample acts on the steps about it as interpolation has it; its expected noise is their mean
-    with the same weights, the transpose of interpolation.
-    """
-    middle, width = 0.5 * (grid[1:] + grid[:-1]), np.diff(grid)
-    total = _build_interpolation(stamps, middle, (0, stamps.size)).T @ (width * steps)
-    return np.asarray(total / float(np.median(np.diff(stamps))))
-
-
-def _build_interpolation(stamps: FloatArray, at: FloatArray, columns: tuple[int, int]) -> csr_array:
-    """Build the matrix (m, count) that interpolates linearly from `stamps` (n,) to `at` (m,).
-
-    Held beyond both ends. `columns` are the first of the stamps' columns and the count of all.
-    """
-    first, count = columns
-    after = np.clip(np.searchsorted(stamps, at), 1, stamps.size - 1)
-    share = (at - stamps[after - 1]) / (stamps[after] - stamps[after - 1])
-    share = np.clip(share, 0.0, 1.0)
-    data = np.column_stack([1.0 - share, share]).ravel()
-    index = first + np.column_stack([after - 1, after]).ravel()
-    return csr_array((data, index, 2 * np.arange(at.size + 1)), shape=(at.size, count))
 
 
 def _extend_ends(signal: MeasuredSignal) -> Signal:
