@@ -17,7 +17,6 @@ import numpy as np
 
 from benchmarks.estimation.study import SLIPS, START_INERTIA, propagate
 from benchmarks.fit.report import format_header, format_row
-from drivetwin._util.arrays import FloatArray
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.data.shift_record import RECORD
@@ -26,9 +25,9 @@ from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_init
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
-from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
@@ -36,7 +35,7 @@ from drivetwin.modeling.component import Component
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.model_components import Place
 from drivetwin.simulation.driveline import ENGINE, OUTPUT, SHAFT, WHEEL, build_driveline
-from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal, Stribeck
 from drivetwin.simulation.network import Output
 from tests.support.bench import Bench, Knowledge, record_bench
 
@@ -129,11 +128,12 @@ def _fit_network(
     model = _build_model(bench, dual, start, inputs)
     exact = {one.name: Tolerance(exact=True) for one in model.components}
     recording = Recording(inputs, outputs)
-    found = model.fit([recording], unknowns, OUTPUTS, tolerances=exact, seed=0)
-    values = np.array([found.values[name] for name in unknowns])
-    std = np.array([found.std[name] for name in unknowns])
-    covariance = found.correlation * np.outer(std, std)
-    return _derive(bench, list(unknowns), values, covariance)
+    functions = _build_expressions(bench, dual)
+    given = unknowns, OUTPUTS
+    found = model.fit([recording], *given, tolerances=exact, expressions=functions, seed=0)
+    derived = [name for name, one in functions.items() if one.paths is not None]
+    names = ["eta", "J_vehicle", "k_o", "c_o", *derived]
+    return {name: (found.values[name], found.std[name]) for name in names}
 
 
 def _build_model(
@@ -157,55 +157,47 @@ def _build_unknowns(bench: Bench, dual: DualClutch, start: ParameterVector) -> d
     guess = {key: float(getattr(law, key)) for key in ("mu_c", "mu_s", "v_s", "mu_v")}
     return {
         "eta": Unknown(dual.eta, paths=("i_in.loss.eta",)),
-        "J1": Unknown(dual.J1, paths=("J1.inertia",)),
+        "Je": Unknown(dual.J1 * dual.eta, bounds=(0.0, None)),
         "J_vehicle": Unknown(dual.J_v, paths=("J_v.inertia",)),
         "load": Unknown(dual.load.constant, paths=("load.constant",)),
         "k_o": Unknown(dual.k_o, paths=(f"{SHAFT}.stiffness",)),
         "c_o": Unknown(dual.c_o, paths=(f"{SHAFT}.damping",)),
-        "te_delay": Unknown(
+        "delay": Unknown(
             -start["te_delay"],
             DELAY_STD,
             (-RECORD.max_delay, RECORD.max_delay),
             (f"delay.{ENGINE_TORQUE}",),
         ),
         "mu_c": Unknown(guess["mu_c"], MU_STD, paths=share("mu_c")),
-        "mu_s": Unknown(guess["mu_s"], MU_STD, paths=(f"{on}.friction.mu_s",)),
+        "drop": Unknown(guess["mu_s"] - guess["mu_c"]),
         "v_s": Unknown(guess["v_s"], guess["v_s"], paths=share("v_s")),
         "mu_v": Unknown(guess["mu_v"], MU_V_STD, paths=share("mu_v")),
-        "mu_s of the off-going": Unknown(guess["mu_s"], MU_STD, paths=(f"{off}.friction.mu_s",)),
+        "drop of the off-going": Unknown(guess["mu_s"] - guess["mu_c"]),
     }
 
 
-def _derive(
-    bench: Bench, names: list[str], values: FloatArray, covariance: FloatArray
-) -> dict[str, tuple[float, float]]:
-    """Return the parameters that the likelihood fit reports, with their standard deviations."""
-
+def _build_expressions(bench: Bench, dual: DualClutch) -> dict[str, Expression]:
+    """Return the functions of the unknowns that the network contains, and the parameters that the
+    likelihood fit reports."""
+    off, on = bench.driveline.offgoing.name, bench.driveline.oncoming
+    law = next(one.friction for one in dual.elements if one.name == on.name)
     output = bench.driveline.J_out
     assert output is not None
+    assert isinstance(law, Stribeck)
+    rest = law.mu_s
 
-    def compute(point: FloatArray) -> dict[str, float]:
-        by_name = dict(zip(names, point.tolist(), strict=True))
-        one = bench.driveline.oncoming
-        inertia = by_name["J1"] * by_name["eta"] + output.value / one.ratio**2
-        law = (by_name["mu_c"], by_name["mu_s"] - by_name["mu_c"], by_name["mu_v"])
-        mu, _ = evaluate_stribeck(
-            np.array([*law, np.log(by_name["v_s"])]), np.array(list(SLIPS.values()))
-        )
-        return {
-            **{key: by_name[key] for key in ("eta", "J_vehicle", "k_o", "c_o")},
-            "te_delay": -by_name["te_delay"],
-            f"J_prime_{one.gear}": inertia,
-            "Tv_over_if": by_name["load"] / bench.driveline.i_f,
-            **dict(zip(SLIPS, mu.tolist(), strict=True)),
-        }
+    def add(drop: str) -> Expression:
+        return Expression(f"mu_c + {drop!r}", value=rest, std=MU_STD)
 
-    base = compute(values)
-    steps = 1e-3 * np.sqrt(np.diag(covariance))
-    columns = [
-        (np.array(list(compute(values + step * unit).values())) - list(base.values())) / step
-        for step, unit in zip(steps, np.eye(values.size), strict=True)
-    ]
-    matrix = np.column_stack(columns)
-    std = np.sqrt(np.einsum("qp,pr,qr->q", matrix, covariance, matrix))
-    return dict(zip(base, zip(base.values(), std.tolist(), strict=True), strict=True))
+    return {
+        "J1.inertia": Expression("Je / eta"),
+        f"{on.name}.friction.mu_s": add("drop"),
+        f"{off}.friction.mu_s": add("drop of the off-going"),
+        "te_delay": Expression("-delay", paths=[]),
+        f"J_prime_{on.gear}": Expression(f"Je + {output.value / on.ratio**2!r}", paths=[]),
+        "Tv_over_if": Expression(f"load / {bench.driveline.i_f!r}", paths=[]),
+        **{
+            name: Expression(f"mu_c + drop * exp(-({slip!r} / v_s)) + mu_v * {slip!r}", paths=[])
+            for name, slip in SLIPS.items()
+        },
+    }

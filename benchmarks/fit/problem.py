@@ -10,13 +10,14 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.fit.fixed_numbers import CopiedElements, FixedNumber, list_fixed, make_plain
+from drivetwin.fit.fixed_numbers import FixedNumber, list_fixed, make_plain
+from drivetwin.fit.places import Numbers, list_places
 from drivetwin.modeling.component import Component
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.model_components import Place
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind
-from drivetwin.simulation.network import Output
+from drivetwin.simulation.network import Output, Start
 
 SPREAD = 0.3
 """Standard deviation of a prior over the value."""
@@ -97,8 +98,10 @@ class Problem:
     @property
     def fixed(self) -> list[FixedNumber]:
         """True numbers that are neither unknown nor exact."""
-        elements = [component.element for component in self.build().components]
-        return list_fixed(make_plain(elements), self.paths, {})
+        model = self.build()
+        elements = make_plain([component.element for component in model.components])
+        places = list_places(elements, Start({}), (), {}, {})
+        return list_fixed(elements, places, self.paths, {})
 
     @property
     def records(self) -> list[Output]:
@@ -188,13 +191,13 @@ def record(problem: Problem, rng: np.random.Generator) -> Realisation:
 
 def move_fixed(problem: Problem, model: Model, moves: FloatArray) -> None:
     """Move the fixed numbers of a model from the true to the stated values."""
-    elements = CopiedElements(make_plain([one.element for one in model.components]))
+    numbers = Numbers({"elements": make_plain([one.element for one in model.components])})
     for one, move in zip(problem.fixed, moves.tolist(), strict=True):
         for place in one.places:
-            elements.put(place, one.move(elements.get(place), move))
+            numbers.put(place, one.move(numbers.get(place), move))
     model.components = [
         replace(one, element=element)
-        for one, element in zip(model.components, elements.listed, strict=True)
+        for one, element in zip(model.components, numbers.tables["elements"], strict=True)
     ]
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,8 +16,9 @@ from drivetwin.findings import Code
 from drivetwin.fit.examine import rank_improvements
 from drivetwin.fit.fit import fit_network
 from drivetwin.fit.fixed_numbers import FixedNumber, Tolerance, list_fixed
-from drivetwin.fit.model_file import format_model, read_model
-from drivetwin.fit.number_kinds import USUAL, UsualDeviation
+from drivetwin.fit.model_file import NetworkFile, format_model, read_model
+from drivetwin.fit.number_kinds import BESIDE, USUAL, UsualDeviation
+from drivetwin.fit.places import CHANNEL
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.fit.unknown import Unknown
@@ -44,6 +46,57 @@ def test_every_number_of_an_element_has_a_distribution(kind: str) -> None:
     exact = {name for name in numbers if USUAL[kind][name] == UsualDeviation()}
     assert all(name.endswith(POINTS) for name in exact)
     assert not any(name.endswith(POINTS) for name in numbers - exact)
+
+
+WITH_DISTRIBUTION = {"inputs.*.value", "start.speeds.*", "start.twists.*"}
+"""Numbers of a model file beside the elements with a distribution of their own."""
+OF_CHANNELS = {"scale": "gain", "offset": "offset", "time_shift_s": "delay"}
+"""Conversions of a column, with the errors of the channel that have a distribution."""
+NO_NUMBERS_OF_THE_MODEL = (
+    "unknowns.", "expressions.", "tolerances.", "run.", "inputs.*.sign", "outputs.*.sign",
+    "outputs.*.sigma",
+)  # fmt: skip
+"""Unknowns and distributions themselves, the manoeuvre of a synthesised log, noise of sensors."""
+
+
+def list_schema_numbers(
+    one: Mapping[str, Any], schema: Mapping[str, Any], path: str = ""
+) -> Iterator[tuple[str, str]]:
+    """Yield the path of each number of a JSON Schema, and the tables in its place."""
+    if "$ref" in one:
+        name = str(one["$ref"]).rpartition("/")[2]
+        if name == "NumberTable":
+            yield path, name
+            return
+        one = schema["$defs"][name]
+    if one.get("type") in ("number", "integer") or any(
+        isinstance(each, int | float) for each in one.get("enum", ())
+    ):
+        yield path, ""
+    for each in (*one.get("anyOf", ()), *one.get("prefixItems", ())):
+        yield from list_schema_numbers(each, schema, path)
+    for key in ("items", "additionalProperties"):
+        if isinstance(one.get(key), dict):
+            below = f"{path}.*" if key == "additionalProperties" else path
+            yield from list_schema_numbers(one[key], schema, below)
+    for key, each in one.get("properties", {}).items():
+        yield from list_schema_numbers(each, schema, f"{path}.{key}" if path else key)
+
+
+def test_every_number_of_a_model_file_has_a_distribution() -> None:
+    schema = NetworkFile.model_json_schema()
+    found: dict[str, set[str]] = {}
+    for path, table in list_schema_numbers(schema, schema):
+        found.setdefault(path, set()).add(table)
+    with_table = {path for path, tables in found.items() if "NumberTable" in tables}
+    assert with_table == WITH_DISTRIBUTION
+    rest = {
+        path for path in found.keys() - with_table if not path.startswith(NO_NUMBERS_OF_THE_MODEL)
+    }
+    conversions = {f"{table}.*.{key}" for table in ("inputs", "outputs") for key in OF_CHANNELS}
+    assert rest == conversions
+    assert set(OF_CHANNELS.values()) == set(CHANNEL)
+    assert set(BESIDE) == {*CHANNEL, "input", "start"}
 
 
 @pytest.mark.parametrize(
@@ -147,7 +200,8 @@ def read(folder: Path, change: tuple[str, str]) -> list[FixedNumber]:
     made = read_model(path)
     path.write_text(format_model(*made), encoding="utf-8")
     model, _ = read_model(path)
-    return list_fixed(model.elements, ["wheel.inertia"], model.tolerances)
+    places = model.list_places(["T"])
+    return list_fixed(model.elements, places, ["wheel.inertia"], model.tolerances)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.errors import InputError
+from drivetwin.fit.expression import Expression
+from drivetwin.fit.fixed_numbers import Tolerance, list_fixed
 from drivetwin.fit.model_file import (
     DrivenInput,
     ModelChannels,
@@ -24,7 +26,7 @@ from drivetwin.fit.model_file import (
 )
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.synthesize import ModelName, read_builtin
-from drivetwin.fit.unknown import Unknown
+from drivetwin.fit.unknown import Unknown, get_factors
 from drivetwin.modeling.model import Model
 from drivetwin.simulation.network import Start
 
@@ -127,11 +129,13 @@ def models(draw: st.DrawFn) -> tuple[NetworkModel, ModelChannels]:
     made.start(dict.fromkeys(nodes, draw(numbers)))
     bounds = (draw(st.none() | st.floats(1e-9, 1e-8)), draw(st.none() | st.floats(1e7, 1e8)))
     unknowns = {f"{parts[0]}.inertia": Unknown(draw(positive), draw(st.none() | positive), bounds)}
-    shared = {f"{parts[0]}.inertia": draw(positive), f"{parts[1]}.inertia": 1.0}
-    if len(nodes) > 1:
-        unknowns[draw(names)] = Unknown(draw(positive), paths=shared)
+    others = {f"{name}.inertia": draw(positive) for name in parts[1 : len(nodes)]}
+    if others:
+        unknowns[draw(names)] = Unknown(draw(positive), paths=others)
     outputs = {draw(names): ("speed", nodes[0])}
-    network = made.describe(unknowns, outputs)  # type: ignore[arg-type]
+    spread = Expression(f"2 * {next(iter(unknowns))!r}", paths=[], value=1.0, std=draw(positive))
+    expressions = {"spread": spread} if "spread" not in unknowns else {}
+    network = made.describe(unknowns, outputs, None, expressions)  # type: ignore[arg-type]
     known = {nodes[0]: network.start.speeds[nodes[0]]} if draw(st.booleans()) else {}
     run = RunTable(
         end_s=draw(positive), inputs={name: DrivenInput(points=[[0.0, 1.5]]) for name in inputs}
@@ -150,7 +154,7 @@ def describe(model: NetworkModel, channels: ModelChannels) -> dict[str, Any]:
     """Return all that a file states as plain data."""
     start, described = model.start, vars(model) | vars(channels)
     unknowns = {
-        name: (one.value, one.std, one.bounds, one.get_factors(name))
+        name: (one.value, one.std, one.bounds, get_factors(name, one.paths))
         for name, one in model.unknowns.items()
     }
     plain = (dict(start.speeds), dict(start.twists), list(start.locked))
@@ -255,7 +259,7 @@ def test_a_wrong_key_is_named(change: tuple[str, str], said: str | None, tmp_pat
         (('type = "inertia"', 'type = "inertai"'), "did you mean 'inertia'"),
         (("wheel.inertia", "weel.inertia"), "did you mean 'wheel'"),
         (("wheel.inertia", "start.weel"), "did you mean 'wheel'"),
-        (("wheel.inertia", "delay.U"), "delay.U: the model has no input 'U'"),
+        (("wheel.inertia", "delay.U"), "delay.U: no number 'U'"),
         (('["speed", "wheel"]', '["sped", "wheel"]'), "did you mean 'speed'"),
         (("value = 1.5", "value = -1.5"), "the value -1.5 is outside 0 to inf"),
     ],
@@ -272,6 +276,103 @@ def test_a_fault_of_the_driveline_is_named(
 def test_a_file_without_elements_is_no_model(text: str, tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match=r"elements|faults|required"):
         read_text(tmp_path, text)
+
+
+STATED = """[[elements]]
+type = "gear"
+name = "pair"
+a = "end"
+b = "49/33"
+ratio = "49/33 * 2/1"
+
+[[elements]]
+type = "clutch"
+name = "K0"
+a = "49/33"
+b = "ground"
+friction.mu_c = {value = 0.1, std = 0.01}
+friction.mu_s = 0.12
+friction.v_s = {value = 5.0, exact = true}
+friction.mu_v = 0.0
+gain = {value = 0.02, std = 1e-3}
+p0 = 5e4
+peak = 1.0
+drum_inertia = 0.0
+pressure = "p"
+
+[[elements]]
+type = "inertia"
+name = "out"
+node = "49/33"
+inertia = {value = 1.0, exact = true}
+
+[inputs.T]
+value = {value = 3.5, std = 0.2}
+
+[outputs"""
+
+
+def test_a_number_may_state_its_distribution(tmp_path: Path) -> None:
+    text = TEXT.replace("[outputs", STATED, 1).replace(
+        "{wheel = 3.0,", "{wheel = {value = 3, std = 0.1},"
+    )
+    model, channels = read_text(tmp_path, text)
+    assert model.tolerances == {
+        "pair.ratio": Tolerance(exact=True),
+        "K0.friction.mu_c": Tolerance(0.01),
+        "K0.friction.v_s": Tolerance(exact=True),
+        "K0.gain": Tolerance(1e-3),
+        "out.inertia": Tolerance(exact=True),
+        "input.T": Tolerance(0.2),
+        "start.wheel": Tolerance(0.1),
+    }
+    by_name = {one["name"]: one for one in model.elements}
+    assert by_name["pair"]["ratio"] == pytest.approx(98.0 / 33.0)
+    assert (by_name["pair"]["b"], by_name["out"]["node"]) == ("49/33", "49/33")
+    assert (by_name["K0"]["gain"], by_name["K0"]["friction"]["mu_c"]) == (0.02, 0.1)
+    assert (model.inputs, channels.known) == ({"T": 3.5}, {"wheel": 3.0})
+    places = model.list_places(channels.inputs)
+    found = {one.name: one.std for one in list_fixed(model.elements, places, (), model.tolerances)}
+    assert (found["input.T"], found["K0.gain"], found["K0.friction.mu_c"]) == (0.2, 1e-3, 0.01)
+    assert not found.keys() & {"out.inertia", "K0.friction.v_s", "pair.ratio", "start.wheel"}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("inertia = 2.0", "inertia = {value = 2.0}"), "wheel.inertia is no distribution"),
+        (("inertia = 2.0", "inertia = {value = 2.0, sdt = 1.0}"), "tolerances.wheel.inertia.sdt"),
+        (("inertia = 2.0", "inertia = {value = 2.0, std = 0.0}"), "tolerances.wheel.inertia.std"),
+        (("inertia = 2.0", "inertia = {std = 2.0}"), "wheel: inertia"),
+        (("inertia = 2.0", 'inertia = {value = "x", std = 2.0}'), "wheel: inertia"),
+        (("inertia = 2.0", 'inertia = "2/0"'), "2/0"),
+        (("wheel = 3.0", "wheel = {value = 3.0, sdt = 1}"), "sdt"),
+        (("wheel = 3.0", 'wheel = {value = "fast"}'), "start.speeds.wheel"),
+        (
+            ("[unknowns", "[tolerances.'shaft.damping']\nstd = 0.1\n[unknowns"),
+            "'tolerances.shaft.damping': stated twice",
+        ),
+        (("[unknowns", "[expressions.x]\nformula = 3\n[unknowns"), "expressions.x.formula"),
+        (("[unknowns", "[expressions.'end.inertia']\nformula = 'J'\n[unknowns"), "'J': no unknown"),
+    ],
+)
+def test_a_wrong_distribution_or_function_is_named(
+    change: tuple[str, str], said: str, tmp_path: Path
+) -> None:
+    text = TEXT.replace("damping = 1.0", "damping = {value = 1.0, std = 0.1}")
+    if "twice" not in said:
+        text = TEXT
+    with pytest.raises(InputError) as caught:
+        read_text(tmp_path, text.replace(*change, 1))
+    assert said in f"{caught.value} {caught.value.where}"
+
+
+def test_a_function_of_python_cannot_be_written() -> None:
+    model, _ = read_builtin(ModelName.TIP_IN)
+    name = next(iter(model.unknowns))
+    given = {"twice": Expression(lambda x: 2.0 * x, (name,), paths=[])}
+    with pytest.raises(InputError, match="'twice' is a function"):
+        format_model(replace(model, expressions=given))
 
 
 def test_all_faults_are_reported_together(tmp_path: Path) -> None:

@@ -57,7 +57,7 @@ def test_intervals_are_symmetric_by_the_logarithm_and_agree_with_the_deviations(
         assert estimate.value == pytest.approx(value)
         assert estimate.std_noise == pytest.approx(std)
         assert estimate.method == WITH_PRIOR
-        assert std < float(one.unknown.std or np.inf)
+        assert std < float(one.stated.std or np.inf)
 
 
 def test_the_correlation_has_a_unit_diagonal() -> None:

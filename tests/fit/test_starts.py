@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from drivetwin.fit.recording import Measured, Recording, build_network_record
-from drivetwin.fit.starts import StartGuess, guess_start, list_starts
+from drivetwin.fit.starts import StartGuess, complete_start, guess_start
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element, Output, Start, build_element
+from drivetwin.vehicle.spec import PriorValue
 
 TIME = np.linspace(0.0, 2.0, 401)
 ELEMENTS: list[Element] = [
@@ -32,7 +33,8 @@ def guess(known: Mapping[str, float]) -> StartGuess:
     }
     recording = Recording({"T": Signal(TIME, np.full(TIME.size, 40.0))}, outputs)
     record = build_network_record(recording, list(OUTPUTS), {})
-    return guess_start(STATED, known, ELEMENTS, OUTPUTS, record)
+    priors = {name: PriorValue(value) for name, value in known.items()}
+    return guess_start(STATED, priors, ELEMENTS, OUTPUTS, record)
 
 
 def test_measured_speeds_and_torques_give_speeds_and_twists() -> None:
@@ -58,4 +60,5 @@ def test_what_is_known_is_taken_and_has_no_prior() -> None:
 
 
 def test_starts_are_stated_nodes_and_all_shafts() -> None:
-    assert list_starts(STATED, ELEMENTS) == ["a", "b", "shaft"]
+    found = complete_start(STATED, ELEMENTS)
+    assert [*found.speeds, *found.twists] == ["a", "b", "shaft"]

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
-from drivetwin.fit.unknown import Unknown, require_known_places, resolve_unknown
-from drivetwin.simulation.network import Element, build_element
+from drivetwin.fit.places import list_places
+from drivetwin.fit.unknown import Unknown, resolve_unknown
+from drivetwin.simulation.network import Element, Start, build_element
 
 MAP = {"speed_ratio": [0.0, 0.8, 1.0], "capacity": [3e-3, 2e-3, 0.0], "torque_ratio": [1.9, 1.1, 1]}
 ELEMENTS: list[Element] = [
@@ -22,11 +23,13 @@ ELEMENTS: list[Element] = [
         drum_inertia=0.0),
     build_element("road_load", "load", node="turbine", constant=3.0, rolling=0.0, aero=0.0),
 ]  # fmt: skip
+START = Start({"engine": 3.0})
+PLACES = list_places(ELEMENTS, START, ["p"], {"T": 5.0}, {"n": ("speed", "engine")})
 
 
 @given(st.floats(1e-6, 1e6), st.floats(1e-3, 1e3))
 def test_a_positive_number_is_sought_by_its_logarithm(value: float, std: float) -> None:
-    one = resolve_unknown("engine.inertia", Unknown(value, std), ELEMENTS)
+    one = resolve_unknown("engine.inertia", Unknown(value, std), PLACES)
     assert one.is_positive
     assert one.start == pytest.approx(math.log(value))
     assert one.spread == pytest.approx(std / value)
@@ -34,49 +37,49 @@ def test_a_positive_number_is_sought_by_its_logarithm(value: float, std: float) 
 
 
 def test_units_and_limits_come_from_the_elements() -> None:
-    one = resolve_unknown("engine.inertia", Unknown(0.2), ELEMENTS)
+    one = resolve_unknown("engine.inertia", Unknown(0.2), PLACES)
     assert one.spec.unit == "kg*m^2"
     assert (one.spec.lower, one.spec.upper) == (0.0, math.inf)
-    assert resolve_unknown("K0.friction.mu_c", Unknown(0.1), ELEMENTS).spec.unit == "1"
-    assert resolve_unknown("delay.p", Unknown(0.0), ELEMENTS).spec.unit == "s"
-    assert not resolve_unknown("start.engine", Unknown(3.0), ELEMENTS).is_positive
+    assert resolve_unknown("K0.friction.mu_c", Unknown(0.1), PLACES).spec.unit == "1"
+    assert resolve_unknown("delay.p", Unknown(0.0), PLACES).spec.unit == "s"
+    assert not resolve_unknown("start.engine", Unknown(3.0), PLACES).is_positive
 
 
 def test_a_number_of_a_table_is_addressed_by_its_place() -> None:
-    one = resolve_unknown("converter.map.capacity.1", Unknown(2e-3, 1e-3), ELEMENTS)
+    one = resolve_unknown("converter.map.capacity.1", Unknown(2e-3, 1e-3), PLACES)
     assert one.factors == {"converter.map.capacity.1": 1.0}
 
 
 def test_bounds_narrow_the_limits_and_a_factor_scales_those_of_its_field() -> None:
     stated = Unknown(0.2, bounds=(0.1, None))
-    assert resolve_unknown("engine.inertia", stated, ELEMENTS).spec.lower == 0.1
-    narrow = resolve_unknown("engine.inertia", Unknown(0.2, bounds=(0.1, 0.4)), ELEMENTS)
+    assert resolve_unknown("engine.inertia", stated, PLACES).spec.lower == 0.1
+    narrow = resolve_unknown("engine.inertia", Unknown(0.2, bounds=(0.1, 0.4)), PLACES)
     assert narrow.limits == pytest.approx((math.log(0.1), math.log(0.4)))
     mirrored = Unknown(-0.2, paths={"engine.inertia": -1.0})
-    spec = resolve_unknown("inverse", mirrored, ELEMENTS).spec
+    spec = resolve_unknown("inverse", mirrored, PLACES).spec
     assert (spec.lower, spec.upper) == (-math.inf, 0.0)
 
 
 @pytest.mark.parametrize(
     ("name", "said", "remedy"),
     [
-        ("K1.gain", "no element 'K1'", "engine, converter, K0, load"),
-        ("K0.friction.mu_x", "K0.friction.mu_x: no field 'mu_x'", "mu_c, mu_s, v_s, mu_v"),
+        ("K1.gain", "no number 'K1'; known here", "engine, converter, K0, load"),
+        ("K0.friction.mu_x", "K0.friction.mu_x: no number 'mu_x'", "mu_c, mu_s, v_s, mu_v"),
         ("K0.friction", "K0.friction is no number", "mu_c, mu_s, v_s, mu_v"),
-        ("K0.gain.x", "K0.gain.x: no field 'x'", ""),
-        ("K0.pressure", "K0.pressure is no number", ""),
+        ("K0.gain.x", "K0.gain.x: no number 'gain.x'", ""),
+        ("K0.pressure", "K0.pressure: no number 'pressure'", "gain, p0"),
         ("converter.map.capacity", "is no number", ""),
-        ("converter.map.capacity.9", "is no number", ""),
-        ("converter.map.capacity.9.2", "no field '2'", ""),
-        ("converter.map.capacity.x", "is no number", ""),
-        ("", "no element ''", ""),
+        ("converter.map.capacity.9", "no number '9'", "0, 1, 2"),
+        ("converter.map.capacity.9.2", "no number '9'", "0, 1, 2"),
+        ("converter.map.capacity.x", "no number 'x'", ""),
+        ("", "is no number", "engine, converter, K0, load"),
     ],
 )
 def test_a_path_that_leads_to_no_number_is_named_with_the_known_ones(
     name: str, said: str, remedy: str
 ) -> None:
     with pytest.raises(InputError) as caught:
-        resolve_unknown(name, Unknown(1.0), ELEMENTS)
+        resolve_unknown(name, Unknown(1.0), PLACES)
     assert said in caught.value.what
     assert remedy in caught.value.remedy
 
@@ -84,7 +87,7 @@ def test_a_path_that_leads_to_no_number_is_named_with_the_known_ones(
 @given(st.lists(st.sampled_from(["K0", "converter", "map", "capacity", "1", "-1", "x", ""])))
 def test_any_path_is_resolved_or_refused(parts: list[str]) -> None:
     try:
-        resolve_unknown(".".join(parts), Unknown(1.0), ELEMENTS)
+        resolve_unknown(".".join(parts), Unknown(1.0), PLACES)
     except InputError:
         return
 
@@ -103,14 +106,38 @@ def test_any_path_is_resolved_or_refused(parts: list[str]) -> None:
 )
 def test_impossible_numbers_are_refused(unknown: Unknown, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        resolve_unknown("engine.inertia", unknown, ELEMENTS)
+        resolve_unknown("engine.inertia", unknown, PLACES)
 
 
-def test_starts_and_delays_need_a_name_of_the_network() -> None:
-    names = {"start.engine": Unknown(1.0), "delay.p": Unknown(0.0), "K0.gain": Unknown(0.01)}
-    sought = [resolve_unknown(name, one, ELEMENTS) for name, one in names.items()]
-    require_known_places(sought, ["engine"], ["p"])
-    with pytest.raises(InputError, match=r"start\.engine: .* 'engine'"):
-        require_known_places(sought, ["turbine"], ["p"])
-    with pytest.raises(InputError, match=r"delay\.p: .* did you mean 'p1'"):
-        require_known_places(sought, ["engine"], ["p1"])
+@pytest.mark.parametrize(
+    ("name", "unit", "positive"),
+    [
+        ("gain.n", "1", True),
+        ("gain.p", "1", True),
+        ("offset.n", "rad/s", False),
+        ("offset.p", "Pa", False),
+        ("delay.n", "s", False),
+        ("delay.p", "s", False),
+        ("input.T", "1", False),
+        ("start.engine", "rad/s", False),
+    ],
+)
+def test_numbers_beside_the_elements_have_units(name: str, unit: str, positive: bool) -> None:
+    one = resolve_unknown(name, Unknown(1.0), PLACES)
+    assert one.spec.unit == unit
+    assert one.is_positive == positive
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("start.engin", "start.engin: .* did you mean 'engine'"),
+        ("delay.q", "delay.q: no number 'q'"),
+        ("gain.T", "gain.T: no number 'T'"),
+        ("input.p", "input.p: no number 'p'"),
+        ("offset", "offset is no number"),
+    ],
+)
+def test_numbers_beside_the_elements_need_a_name_of_the_network(name: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        resolve_unknown(name, Unknown(1.0), PLACES)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from drivetwin.simulation.variable import (
     Variable,
     exp,
+    log,
     sign,
 )
 
@@ -22,6 +23,8 @@ EXPRESSIONS: list[Callable[[float, float], float]] = [
     lambda x, y: exp(-x) * y**2 + abs(y) * sign(x),
     lambda x, y: 3.0 / (x * x + y * y),
     lambda x, y: -(x**3.0) / exp(y),
+    lambda x, y: x**y + 2.0**x * log(y),
+    lambda x, y: (-2.0) ** 3.0 * x + (-x) ** 2.0 + y,
 ]
 NUMBERS = st.floats(0.2, 4.0)
 

@@ -16,20 +16,16 @@ from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import SignalFit
+from drivetwin.fit.expression import ResolvedNumbers, add_rows
 from drivetwin.fit.fixed_numbers import list_fixed, make_plain
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.places import Place
 from drivetwin.fit.plant import Plant
 from drivetwin.fit.recording import NetworkRecord, Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import search
-from drivetwin.fit.starts import drop_redundant_speeds, guess_start, list_starts
+from drivetwin.fit.starts import drop_redundant_speeds, guess_start
 from drivetwin.fit.term import NetworkTerm, Problem
-from drivetwin.fit.unknown import (
-    SoughtNumber,
-    require_distinct_places,
-    require_known_places,
-    resolve_unknown,
-)
 from drivetwin.simulation.element_schema import (
     GROUND,
     find_element_faults,
@@ -38,6 +34,7 @@ from drivetwin.simulation.element_schema import (
     refuse_faults,
 )
 from drivetwin.simulation.network import make_input
+from drivetwin.vehicle.spec import PriorValue
 
 _DELAY_REACH = 5.0
 """Standard deviations of its prior by which a delay may be off."""
@@ -91,52 +88,66 @@ def fit_network(model: NetworkModel, recordings: Sequence[Recording], *, seed: i
     IdentificationError
         Where no start leads to a minimum.
     """
-    problem, point, sought = build_problem(model, recordings)
-    unknown = {path for one in sought for path in one.factors}
-    fixed = list_fixed(problem.terms[0].plant.elements, unknown, model.tolerances)
-    return conclude(model, sought, search(problem, point, sought, fixed, seed))
+    problem, point, numbers = build_problem(model, recordings)
+    plant = problem.terms[0].plant
+    set_there = {one.path for one in plant.settings}
+    fixed = list_fixed(plant.elements, plant.places, set_there, model.tolerances)
+    return conclude(model, numbers, search(problem, point, numbers.sought, fixed, seed))
 
 
 def build_problem(
     model: NetworkModel, recordings: Sequence[Recording]
-) -> tuple[Problem, ParameterVector, list[SoughtNumber]]:
-    """Build the objective, the first guess of all its unknowns, and those of the network."""
+) -> tuple[Problem, ParameterVector, ResolvedNumbers]:
+    """Build the objective, the first guess of all its unknowns, and the numbers of the network that
+    are unknowns or functions of them."""
     _require_consistent(model, recordings)
     model = replace(model, elements=make_plain(model.elements))
-    sought = [resolve_unknown(name, one, model.elements) for name, one in model.unknowns.items()]
-    require_distinct_places(sought)
+    used = {name for one in model.elements for name in list_inputs(one)}
+    recorded = (name for one in recordings for name in one.inputs if name in used)
+    places = model.list_places(recorded)
+    numbers = model.resolve(places)
+    sought, settings = numbers.sought, numbers.settings
     found = _Coordinates([], [], {}, [])
-    for one in sought:
-        found.add(one.name, one.start, one.spread, one.limits)
-    plain = Plant(model.elements, {}, model.start, model.outputs, sought)
+    for each in sought:
+        found.add(each.name, each.start, each.spread, each.limits)
+    start, outputs = model.start, model.outputs
+    plain = Plant(model.elements, {}, start, outputs, sought, settings, places, model.levels)
     terms = []
     for number, recording in enumerate(recordings, start=1):
         _require_inputs(model, recording)
-        names = list_starts(model.start, model.elements)
-        require_known_places(sought, names, {**recording.inputs, **model.inputs})
-        _require_known_starts(recording, names, sought)
-        record = build_network_record(recording, list(model.outputs), _find_reach(sought))
+        _require_known_starts(recording, places, numbers)
+        record = build_network_record(recording, list(outputs), _find_reach(numbers))
         plant = _build_plant(plain, model, recording, record)
-        guess = guess_start(plant.start, recording.start, model.elements, model.outputs, record)
-        paths = {path for one in sought for path in one.factors}
+        known = _describe_known(recording, model)
+        guess = guess_start(plant.start, known, model.elements, outputs, record)
+        paths = {one.path for one in settings}
         own = [name for name in guess.priors if f"start.{name}" not in paths]
         label = f"log{number}" if len(recordings) > 1 else ""
         plant = replace(plant, start=guess.start, own=own, label=label)
         for name in own:
-            known = guess.priors[name]
-            limits = (-np.inf, np.inf)
-            found.add(plant.get_start_name(name), known.value, known.std, limits)
+            one, limits = guess.priors[name], (-np.inf, np.inf)
+            found.add(plant.get_start_name(name), one.value, one.std, limits)
         terms.append(NetworkTerm.from_sensor_noise(plant, record))
     prior = Prior.from_independent(len(found.names), found.priors)
     lower, upper = np.array(found.limits).T
     point = ParameterVector(tuple(found.names), np.array(found.values))
+    prior = add_rows(prior, point, numbers.derived)
     for term in terms:
         term.simulate(point)  # raises InputError for a start or output that the network lacks
     for recording in recordings:
         _require_used(model, recording)
     reach = np.full(len(found.names), np.inf)
     reach[: len(sought)] = [_LARGEST_STEP if one.is_positive else np.inf for one in sought]
-    return LikelihoodObjective(tuple(terms), prior, lower, upper, reach), point, sought
+    return LikelihoodObjective(tuple(terms), prior, lower, upper, reach), point, numbers
+
+
+def _describe_known(recording: Recording, model: NetworkModel) -> dict[str, PriorValue]:
+    """Return the known starts of a recording with their stated tolerances."""
+    found = {}
+    for name, value in recording.start.items():
+        stated = model.tolerances.get(f"start.{name}")
+        found[name] = PriorValue(value, (stated and stated.std) or 0.0)
+    return found
 
 
 def _build_plant(
@@ -152,31 +163,34 @@ def _build_plant(
     }
     every = {**inputs, **record.inputs}
     start = drop_redundant_speeds(model.start, model.elements, every, record.time[:2])
-    return replace(plain, inputs=inputs, start=start)
+    sizes = {name: float(np.max(np.abs(one.values))) for name, one in record.inputs.items()}
+    return replace(plain, inputs=inputs, start=start, sizes=sizes)
 
 
-def _find_reach(sought: Sequence[SoughtNumber]) -> dict[str, float]:
-    """Find the time [s] by which each input with an unknown delay may act early or late: by its
-    prior, within its bounds."""
+def _find_reach(numbers: ResolvedNumbers) -> dict[str, float]:
+    """Find the time [s] by which each channel with an unknown delay may be early or late: by the
+    prior of the delay, within its bounds."""
     reach = {}
-    for one in sought:
+    for one in numbers.sought:
         for path in one.factors:
             head, _, name = path.partition(".")
             if head == "delay":
                 spread = _USUAL_DELAY if one.spread is None else _DELAY_REACH * one.spread
-                usual = abs(one.unknown.value) + spread
+                usual = abs(one.stated.value) + spread
                 reach[name] = min(usual, max(abs(one.spec.lower), abs(one.spec.upper)))
     return reach
 
 
 def _require_known_starts(
-    recording: Recording, names: Sequence[str], sought: Sequence[SoughtNumber]
+    recording: Recording, places: Mapping[str, Place], numbers: ResolvedNumbers
 ) -> None:
     """Raise InputError for a known start of a node or shaft that the model does not start, or that
     is an unknown."""
+    names = [path.partition(".")[2] for path, one in places.items() if one.field == "start"]
+    owners = {path: one.name for one in numbers.acting for path in one.factors}
     for name in recording.start:
-        owner = next((one.name for one in sought if f"start.{name}" in one.factors), None)
-        if owner is not None:
+        if f"start.{name}" in owners:
+            owner = owners[f"start.{name}"]
             what = f"start.{name}: known by the recording, and set by the unknown {owner!r}"
             raise InputError(what, "leave it out of the start of the recording, or the unknowns")
         if name not in names:
@@ -278,14 +292,14 @@ def predict(found: ModelFit, recordings: Sequence[Recording]) -> tuple[HeldOut, 
     """
     held = []
     for recording in recordings:
-        problem, point, sought = build_problem(found.fitted, [recording])
-        count = len(sought)
+        problem, point, numbers = build_problem(found.fitted, [recording])
+        count = len(numbers.sought)
         mean, precision = problem.prior.mean.copy(), problem.prior.precision.copy()
         mean[:count] = found.minimum.point.values[:count]
         spread = np.sqrt(np.diag(found.covariance)[:count])
         precision[:count, :count] = np.diag((_HELD * spread) ** -2.0)
         values = np.concatenate([mean[:count], point.values[count:]])
-        prior = replace(problem.prior, mean=mean, precision=precision)
+        prior = Prior(mean, precision)
         problem, point = replace(problem, prior=prior), point.replace_values(values)
         rough = minimise(problem, point, rough=True)
         end = rough and minimise(problem.update_weighting(rough.point), rough.point)

@@ -7,27 +7,22 @@ direct gear, no loss, a capacity that is an input.
 
 from __future__ import annotations
 
-import copy
 import math
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import StrEnum
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from drivetwin.errors import InputError, suggest_spelling
-from drivetwin.fit.number_kinds import USUAL, UsualDeviation
+from drivetwin.fit.number_kinds import UsualDeviation
+from drivetwin.fit.places import Keys, Place
 from drivetwin.fit.unknown import ASCII_UNITS
-from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind
-from drivetwin.simulation.element_schema import Field as ElementField
-from drivetwin.simulation.serialize import is_number
 from drivetwin.simulation.variable import exp
 from drivetwin.vehicle.spec import describe_ratio
-
-Place = tuple[int | str, ...]
-"""Number of an element, and the keys that lead to a number of it."""
 
 
 class Source(StrEnum):
@@ -69,7 +64,7 @@ class FixedNumber:
     std: float
     unit: str
     is_relative: bool
-    places: tuple[Place, ...]
+    places: tuple[Keys, ...]
     source: Source
 
     @property
@@ -84,43 +79,20 @@ class FixedNumber:
         return self.std * coordinate + number  # a `WrittenNumber` in front would drop derivatives
 
 
-class CopiedElements:
-    """Elements of a network, each of which is copied before a number of it changes."""
-
-    def __init__(self, elements: Sequence[Mapping[str, Any]]) -> None:
-        self.listed: list[Any] = list(elements)
-        self._copied: set[int | str] = set()
-
-    def get(self, place: Place) -> float:
-        """Return the number at a place."""
-        found: Any = self.listed
-        for key in place:
-            found = found[key]
-        return cast("float", found)
-
-    def put(self, place: Place, number: float) -> None:
-        """Put a number at a place."""
-        index, *keys = place
-        if index not in self._copied:
-            self.listed[int(index)] = copy.deepcopy(self.listed[int(index)])
-            self._copied.add(index)
-        found = self.listed[int(index)]
-        for key in keys[:-1]:
-            found = found[key]
-        found[keys[-1]] = number
-
-
 def list_fixed(
     elements: Sequence[Mapping[str, Any]],
+    places: Mapping[str, Place],
     unknown: Collection[str],
     tolerances: Mapping[str, Tolerance],
 ) -> list[FixedNumber]:
-    """List the numbers of a network that are neither unknown nor exact.
+    """List the numbers of a network and its channels that are neither unknown nor exact.
 
     Parameters
     ----------
     elements
         Elements of the network.
+    places
+        Its numbers by path. Known starts are not listed: each recording has its own.
     unknown
         Paths of the unknowns.
     tolerances
@@ -131,45 +103,37 @@ def list_fixed(
     InputError
         For a tolerance that is none, or whose path leads to no number.
     """
-    _require_sound(elements, tolerances)
-    return [
-        one
-        for index, element in enumerate(elements)
-        for one in _list_of_element(index, element, unknown, tolerances)
-    ]
-
-
-def _list_of_element(
-    index: int,
-    element: Mapping[str, Any],
-    unknown: Collection[str],
-    tolerances: Mapping[str, Tolerance],
-) -> Iterator[FixedNumber]:
-    """Yield the fixed numbers of an element, and the factors that some of them share."""
-    levels: dict[str, list[Place]] = {}
-    kinds = USUAL[str(element["type"])]
-    for keys, field, schema, number in iterate_numbers(element):
-        usual, path, place = kinds[field], _join(element, keys), (index, *keys)
-        if path in unknown or number == 0.0 or (usual.unit and number == 1.0):
-            continue
+    _require_sound(elements, places, tolerances)
+    found: list[FixedNumber] = []
+    levels: dict[tuple[Keys, str], list[Place]] = {}
+    for path, one in places.items():
+        usual, number = one.usual, one.value
         groups = _iterate_groups(path)
-        stated = next((tolerances[one] for one in groups if one in tolerances), None)
+        stated = next((tolerances[each] for each in groups if each in tolerances), None)
+        is_absent = number == 0.0 and one.keys[0] == "elements"
+        if path in unknown or is_absent or (usual.unit and number == 1.0) or one.field == "start":
+            continue
         if stated is None and usual.shared:
-            levels.setdefault(usual.shared, []).append(place)
+            levels.setdefault((one.keys[:2], usual.shared), []).append(one)
         std, source = _find_deviation(number, usual, stated)
         if std > 0.0:
-            is_relative = not (usual.absolute or usual.digits)
-            unit = schema.unit.translate(ASCII_UNITS)
-            yield FixedNumber(path, float(number), std, unit, is_relative, (place,), source)
-    for shared, places in levels.items():
-        (level,) = {one.level for one in kinds.values() if one.shared == shared}
-        name = f"factor of {element['name']}.{shared}"
-        yield FixedNumber(name, 1.0, level, "", True, tuple(places), Source.USUAL)
+            is_relative = not (usual.absolute or usual.digits or usual == UsualDeviation())
+            unit = one.schema.unit.translate(ASCII_UNITS)
+            found.append(
+                FixedNumber(path, float(number), std, unit, is_relative, (one.keys,), source)
+            )
+    for (_, index), shared in levels:
+        inside = levels[(("elements", index), shared)]
+        name = f"factor of {elements[int(index)]['name']}.{shared}"
+        keys, level = tuple(one.keys for one in inside), inside[0].usual.level
+        found.append(FixedNumber(name, 1.0, level, "", True, keys, Source.USUAL))
+    return sorted(found, key=_get_order)
 
 
-def _join(element: Mapping[str, Any], keys: Place) -> str:
-    """Return the path of a number of an element."""
-    return ".".join(map(str, (element["name"], *keys)))
+def _get_order(one: FixedNumber) -> int:
+    """Return the place of a fixed number in the list: elements in their order, channels last."""
+    table, index, *_ = one.places[0]
+    return int(index) if table == "elements" else sys.maxsize
 
 
 def _iterate_groups(path: str) -> Iterator[str]:
@@ -203,47 +167,18 @@ def make_plain(description: Any) -> Any:
     return description
 
 
-def iterate_numbers(element: Mapping[str, Any]) -> Iterator[tuple[Place, str, ElementField, float]]:
-    """Yield the keys, the path of the field, its schema and the value of each number of an
-    element."""
-    fields = ELEMENT_FIELDS[str(element["type"])]
-    waiting: list[tuple[Place, str, ElementField, Any]] = [
-        ((name,), name, one, element.get(name)) for name, one in fields.items()
-    ]
-    while waiting:
-        keys, field, one, value = waiting.pop(0)
-        if value is None:
-            continue
-        if one.kind is FieldKind.GROUP:
-            inner = next((each for each in one.group if set(value) <= set(each)), one.group[0])
-            waiting += [
-                ((*keys, name), f"{field}.{name}", each, value.get(name))
-                for name, each in inner.items()
-            ]
-        else:
-            yield from (((*keys, *at), field, one, each) for at, each in _iterate_cells(value))
-
-
-def _iterate_cells(value: Any) -> Iterator[tuple[Place, float]]:
-    """Yield the keys and the value of a number, or of each one of a list or table."""
-    if isinstance(value, list | tuple):
-        for k, each in enumerate(value):
-            yield from (((k, *keys), number) for keys, number in _iterate_cells(each))
-    elif is_number(value):
-        yield (), value
-
-
 def _require_sound(
-    elements: Sequence[Mapping[str, Any]], tolerances: Mapping[str, Tolerance]
+    elements: Sequence[Mapping[str, Any]],
+    places: Mapping[str, Place],
+    tolerances: Mapping[str, Tolerance],
 ) -> None:
     """Raise InputError for a tolerance that is none, that leads to no number, or whose deviation is
     one of several fields."""
-    fields: dict[str, set[str]] = {}
-    for element in elements if tolerances else ():
-        fields[str(element["name"])] = set()
-        for keys, field, *_ in iterate_numbers(element):
-            for path in _iterate_groups(_join(element, keys)):
-                fields.setdefault(path, set()).add(f"{element['name']}.{field}")
+    fields: dict[str, set[str]] = {str(one["name"]): set() for one in elements}
+    for place in places.values() if tolerances else ():
+        of = elements[int(place.keys[1])]["name"] if place.keys[0] == "elements" else place.keys[1]
+        for path in _iterate_groups(place.path):
+            fields.setdefault(path, set()).add(f"{of}.{place.field}")
     for path, one in tolerances.items():
         if path not in fields:
             what = f"tolerances.{path}: no number of the model{suggest_spelling(path, fields)}"

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from drivetwin._util.toml import (
     Fault,
@@ -24,14 +25,15 @@ from drivetwin._util.toml import (
 )
 from drivetwin.channels.read_options import ChannelSpec
 from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES, get_quantity
-from drivetwin.errors import InputError, suggest_spelling
+from drivetwin.errors import InputError, Where, suggest_spelling
+from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance, list_fixed
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
-from drivetwin.fit.starts import list_starts
-from drivetwin.fit.unknown import Unknown, require_known_places, resolve_unknown
+from drivetwin.fit.unknown import Unknown, get_factors
 from drivetwin.simulation.element_schema import (
     ELEMENT_FIELDS,
+    FieldKind,
     Limit,
     find_element_faults,
     iterate_out_of_range,
@@ -39,6 +41,7 @@ from drivetwin.simulation.element_schema import (
     refuse_faults,
 )
 from drivetwin.simulation.network import Start
+from drivetwin.vehicle.spec import TEETH, parse_teeth
 
 Positive = Annotated[float, Field(gt=0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -92,10 +95,26 @@ class ChannelEntry(StrictModel):
         )
 
 
+class NumberTable(StrictModel):
+    """Number with its distribution: `std` as in `[tolerances]`, or `exact`."""
+
+    value: float
+    std: Positive | None = None
+    exact: bool = False
+
+
+def _get_value(stated: object) -> object:
+    return NumberTable.model_validate(stated).value if isinstance(stated, dict) else stated
+
+
+Number = Annotated[float, BeforeValidator(_get_value, json_schema_input_type=float | NumberTable)]
+"""Number of a file, or a table that states its distribution; see `_collect_stated`."""
+
+
 class InputEntry(ChannelEntry):
     """`[inputs.NAME]`: a column of the log, or a constant `value` in SI."""
 
-    value: float | None = None
+    value: Number | None = None
 
 
 class OutputEntry(ChannelEntry):
@@ -112,12 +131,12 @@ class OutputEntry(ChannelEntry):
 class StartTable(StrictModel):
     """`[start]`: speeds of nodes [rad/s] and twists of shafts [rad], as first guesses.
 
-    The nodes determine the speeds of all others. Those in `known` are known; `locked` are the
-    elements without slip.
+    The nodes determine the speeds of all others. Those in `known`, or with a distribution, are
+    known; `locked` are the elements without slip.
     """
 
-    speeds: dict[str, float] = Field(default_factory=dict)
-    twists: dict[str, float] = Field(default_factory=dict)
+    speeds: dict[str, Number] = Field(default_factory=dict)
+    twists: dict[str, Number] = Field(default_factory=dict)
     locked: list[str] = Field(default_factory=list)
     known: list[str] = Field(default_factory=list)
 
@@ -177,6 +196,7 @@ class NetworkFile(StrictModel):
     outputs: dict[str, OutputEntry] = Field(default_factory=dict)
     start: StartTable = StartTable()
     unknowns: dict[str, Annotated[Unknown, FromTable]] = Field(default_factory=dict)
+    expressions: dict[str, Annotated[Expression, FromTable]] = Field(default_factory=dict)
     tolerances: dict[str, Annotated[Tolerance, FromTable]] = Field(default_factory=dict)
     run: RunTable | None = None
 
@@ -208,6 +228,8 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
     """
     document = read_toml(path, ModelFileError)
     raise_faults(validate_schema(document, NetworkFile), ModelFileError, str(path), _REMEDY)
+    document = _collect_stated(document, str(path))
+    raise_faults(validate_schema(document, NetworkFile), ModelFileError, str(path), _REMEDY)
     file = NetworkFile.model_validate(document)
     elements = file.elements
     refuse_faults(find_element_faults(elements))
@@ -225,10 +247,11 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         {name: to_output(one.quantity) for name, one in file.outputs.items()},
         dict(file.unknowns),
         dict(file.tolerances),
+        dict(file.expressions),
     )
-    sought = [resolve_unknown(name, one, elements) for name, one in model.unknowns.items()]
-    require_known_places(sought, list_starts(model.start, elements), used)
-    list_fixed(elements, (), model.tolerances)  # raises InputError for a tolerance that is none
+    places = model.list_places(name for name in needed if name not in constant)
+    model.resolve(places)  # raises InputError for an unknown that is none
+    list_fixed(elements, places, (), model.tolerances)  # as well for a tolerance
     channels = ModelChannels(
         {
             name: file.inputs.get(name, InputEntry()).to_spec(name)
@@ -246,6 +269,60 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         },
     )
     return model, channels
+
+
+def _collect_stated(document: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """Return a sound document with plain numbers, in which `tolerances` contain all that tables and
+    tooth counts state of them, and starts of which something is stated are known.
+
+    Raises ModelFileError for a number that is stated twice, and for tooth counts that are none.
+    """
+    found = copy.deepcopy(dict(document))
+    start, tolerances = found.setdefault("start", {}), found.setdefault("tolerances", {})
+    stated: dict[str, Any] = {}
+    try:
+        for table, key, path in _iterate_numbers(found):
+            table[key] = _read_number(table[key], path, stated)
+    except ValueError as error:
+        raise ModelFileError(str(error), _REMEDY, Where(file=file)) from None
+    twice = [Fault(f"tolerances.{path}", "stated twice") for path in stated if path in tolerances]
+    raise_faults(twice, ModelFileError, file, _REMEDY)
+    tolerances.update(stated)
+    begun = [path.removeprefix("start.") for path in stated if path.startswith("start.")]
+    start["known"] = [*start.get("known", []), *begun]
+    return found
+
+
+def _iterate_numbers(document: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str, str]]:
+    """Yield table, key and path of the numbers of a document that may state their distribution.
+
+    A text of an element may be the name of a node or input as well.
+    """
+    texts = (FieldKind.NODE, FieldKind.INPUT, FieldKind.TEXT)
+    for one in document["elements"]:
+        fields = ELEMENT_FIELDS.get(one.get("type"), {})
+        names = {"type", "name", *(key for key, field in fields.items() if field.kind in texts)}
+        yield from ((one, key, f"{one.get('name')}.{key}") for key in one if key not in names)
+    for name, one in document.get("inputs", {}).items():
+        yield from ((one, key, f"input.{name}") for key in one if key == "value")
+    for kind in ("speeds", "twists"):
+        table = document["start"].get(kind, {})
+        yield from ((table, name, f"start.{name}") for name in table)
+
+
+def _read_number(given: Any, path: str, stated: dict[str, Any]) -> Any:
+    """Return a description of numbers without their distributions, which go to those `stated`."""
+    if isinstance(given, str) and TEETH.fullmatch(given):
+        stated[path] = {"exact": True}
+        return parse_teeth(given)
+    if isinstance(given, dict) and "value" in given:
+        stated[path] = {key: one for key, one in given.items() if key != "value"}
+        return given["value"]
+    if isinstance(given, dict):
+        return {key: _read_number(one, f"{path}.{key}", stated) for key, one in given.items()}
+    if isinstance(given, list):
+        return [_read_number(one, f"{path}.{key}", stated) for key, one in enumerate(given)]
+    return given
 
 
 def _refuse_unused(file: NetworkFile, used: Sequence[str], name: str) -> None:
@@ -296,6 +373,12 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
     lines.append(format_entry("known", list(channels.known) if channels else []))
     for name, one in model.unknowns.items():
         lines += ["", f"[unknowns.{format_key(name)}]", *_format_unknown(name, one)]
+    for name, expression in model.expressions.items():
+        if not isinstance(expression.formula, str):
+            what = f"the expression {name!r} is a function, which a model file cannot state"
+            raise InputError(what, "state it as a text")
+        lines += ["", f"[expressions.{format_key(name)}]"]
+        lines += [format_entry(*item) for item in list_stated(expression).items()]
     for path, tolerance in model.tolerances.items():
         lines += ["", f"[tolerances.{format_key(path)}]"]
         lines += [format_entry(*item) for item in list_stated(tolerance).items()]
@@ -329,7 +412,7 @@ def _format_unknown(name: str, one: Unknown) -> list[str]:
         ends = [-math.inf if low is None else low, math.inf if high is None else high]
         lines.append(format_entry("bounds", ends))
     if one.paths is not None:
-        lines.append(format_entry("paths", one.get_factors(name)))
+        lines.append(format_entry("paths", get_factors(name, one.paths)))
     return lines
 
 

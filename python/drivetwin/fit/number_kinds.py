@@ -113,3 +113,9 @@ USUAL: Mapping[str, Mapping[str, UsualDeviation]] = {
 }
 """Usual deviations by type of element and field. The points at which a table is given are exact:
 the values there have the distribution."""
+
+BESIDE: Mapping[str, UsualDeviation] = dict.fromkeys(
+    ("gain", "offset", "delay", "input", "start"), _EXACT
+)
+"""Usual deviations of the numbers beside the elements, by the first name of their path: of a
+channel, of a constant input, of a known start. They are exact unless a tolerance is stated."""

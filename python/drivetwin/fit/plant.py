@@ -1,30 +1,66 @@
 # SPDX-License-Identifier: MIT
-"""Network of a recording at a point of the unknowns."""
+"""Network of a recording and the channels of its outputs, at a point of the unknowns."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.data.output import Output as ComparedOutput
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.fit.fixed_numbers import CopiedElements, FixedNumber, Place, iterate_numbers
-from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.fit.fixed_numbers import FixedNumber
+from drivetwin.fit.places import CHANNEL, Numbers, Place
+from drivetwin.fit.unknown import Setting, SoughtNumber
 from drivetwin.simulation.dual_clutch import Accuracy, Signal
-from drivetwin.simulation.network import Element, Output, Sine, Start
+from drivetwin.simulation.network import Element, Output, Sine, Start, make_input
 from drivetwin.simulation.network_sensitivity import NetworkTask
-from drivetwin.simulation.variable import exp
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Measured quantity of a quantity x: `gain` · x(t - `delay`) + `offset`."""
+
+    gain: float = 1.0
+    offset: float = 0.0
+    delay: float = 0.0
+
+    def shift(self, time: FloatArray, columns: FloatArray) -> FloatArray:
+        """Interpolate quantities (N, ...) at the instants `time` (N,) [s] less the delay."""
+        if self.delay == 0.0:
+            return columns
+        at = time - self.delay
+        after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
+        share = np.clip((at - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+        share = share.reshape(-1, *[1] * (columns.ndim - 1))
+        return np.asarray((1.0 - share) * columns[after - 1] + share * columns[after])
+
+    def show(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """Compute the measured quantity (N, ...) of a quantity over `time` (N,) [s]."""
+        return np.asarray(self.gain * self.shift(time, column) + self.offset)
+
+    def find_shown(self, out: ComparedOutput, time: FloatArray) -> ComparedOutput:
+        """Return an output with its samples at the points of the grid `time` (N,) [s] that they
+        show: earlier by the delay."""
+        if self.delay == 0.0:
+            return out
+        place = np.searchsorted(time, time[out.place] - self.delay)
+        return replace(out, place=np.minimum(place, time.size - 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Plant:
     """Network of one recording.
 
-    `inputs` are those that no channel gives. `sought` are the unknowns of the network, `own` those
-    of the start of this recording by node or shaft, `fixed` the numbers beside the unknowns that
-    may move. `label` precedes the start in the vector of the unknowns: `log1.start.engine`; empty
-    where there is one recording.
+    `inputs` are those that no channel gives, `levels` the constant ones among them, `sizes` the
+    largest magnitudes of the others, SI. `places` are the numbers by path, `settings` those that
+    the unknowns `sought` set. `own` are the unknowns of the start of this recording by node or
+    shaft, `fixed` the numbers beside the unknowns that may move. `label` precedes the start in the
+    vector of the unknowns: `log1.start.engine`; empty where there is one recording.
     """
 
     elements: Sequence[Element]
@@ -32,64 +68,69 @@ class Plant:
     start: Start
     outputs: Mapping[str, Output]
     sought: Sequence[SoughtNumber]
+    settings: Sequence[Setting]
+    places: Mapping[str, Place]
+    levels: Mapping[str, float] = field(default_factory=dict)
+    sizes: Mapping[str, float] = field(default_factory=dict)
     own: Sequence[str] = ()
     label: str = ""
     fixed: Sequence[FixedNumber] = ()
     accuracy: Accuracy = field(default_factory=Accuracy)
 
     @cached_property
-    def _places(self) -> dict[str, tuple[Place, bool]]:
-        """Place of each number by its path, and whether the core differentiates by it."""
-        return {
-            ".".join(map(str, (one["name"], *keys))): ((index, *keys), field.differentiable)
-            for index, one in enumerate(self.elements)
-            for keys, _, field, _ in iterate_numbers(one)
-        }
+    def _settings(self) -> list[tuple[Setting, Place]]:
+        """Numbers that the unknowns set, with their places."""
+        return [(one, self.places[one.path]) for one in self.settings]
 
     @cached_property
-    def _targets(self) -> list[tuple[SoughtNumber, Place, float]]:
-        """Place and factor of each number that an unknown sets; that of a delay or a start is
-        `("delay", name)` or `("start", name)`."""
-        found = []
-        for one in self.sought:
-            for path, factor in one.factors.items():
-                head, _, name = path.partition(".")
-                is_number = head not in ("delay", "start")
-                place = self._places[path][0] if is_number else (head, name)
-                found.append((one, place, factor))
-        return found
+    def _acting(self) -> list[tuple[str, Place]]:
+        """Coordinates with the places of the numbers on which they act."""
+        by_keys = {one.keys: one for one in self.places.values()} if self.fixed else {}
+        fixed = [(one.coordinate, by_keys[keys]) for one in self.fixed for keys in one.places]
+        return [*((name, place) for one, place in self._settings for name in one.of), *fixed]
 
-    def _iterate_numbers(self, point: ParameterVector) -> Iterator[tuple[Place, float]]:
-        """Yield place and value of each number that the unknowns set."""
-        for one, place, factor in self._targets:
-            coordinate = point[one.name]
-            value = exp(coordinate) if one.is_positive else coordinate
-            yield place, value if factor == 1.0 else factor * value
+    @cached_property
+    def _channels(self) -> dict[str, set[str]]:
+        """Names of the inputs, outputs and levels on which coordinates act."""
+        keys = [place.keys for _, place in self._acting]
+        return {
+            table: {str(one[1]) for one in keys if one[0] == table}
+            for table in ("inputs", "outputs", "levels")
+        }
 
     def get_start_name(self, name: str) -> str:
         """Return the unknown of the start of a node or shaft."""
         return f"{self.label}.start.{name}" if self.label else f"start.{name}"
 
-    def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
-        """Return the delay [s] of each of `inputs` at `point`."""
-        sought = {
-            p[1]: float(number) for p, number in self._iterate_numbers(point) if p[0] == "delay"
-        }
-        return {name: sought.get(name, float(one.delay)) for name, one in inputs.items()}
-
     def list_undifferentiated(self) -> list[str]:
         """List the coordinates that act on numbers by which the core has no derivatives."""
-        plain = {path: place for path, (place, known) in self._places.items() if not known}
-        places = {*plain.values()}
-        sought = [one.name for one in self.sought if plain.keys() & one.factors.keys()]
-        fixed = [one.coordinate for one in self.fixed if places.intersection(one.places)]
-        return [*sought, *fixed]
+        plain = (name for name, place in self._acting if not place.schema.differentiable)
+        return list(dict.fromkeys(plain))
+
+    def list_common(self) -> set[str]:
+        """List the unknowns that act on numbers which runs side by side have in common."""
+        return {name for one, place in self._settings if _is_common(place) for name in one.of}
+
+    def compute_sets(self, draws: FloatArray) -> dict[str, FloatArray]:
+        """Compute the values (n,) by path that `draws` (n, k) of the unknowns set in n runs."""
+        rows = [
+            {one.name: one.to_value(x) for one, x in zip(self.sought, row, strict=True)}
+            for row in draws.tolist()
+        ]
+        return {
+            one.path: np.array([one.compute(*(row[name] for name in one.of)) for row in rows])
+            for one, place in self._settings
+            if not _is_common(place)
+        }
 
     def get_step(self, name: str) -> float:
         """Return the step of a coordinate for a difference of runs."""
+        acted = [place for one, place in self._acting if one == name and place.field == "offset"]
+        sizes = [self.sizes.get(str(place.keys[1]), 0.0) for place in acted]
         for one in self.sought:
             if one.name == name:
-                return _SHARE * (1.0 if one.is_positive else max(abs(one.start), 1e-6))
+                size = max(abs(one.start), one.spread or 0.0, *sizes, 1e-6)
+                return _SHARE * (1.0 if one.is_positive else size)
         return _STEP
 
     def build_task(
@@ -99,28 +140,88 @@ class Plant:
 
         Numbers carry their derivatives where those of the point do.
         """
-        elements = CopiedElements(self.elements)
         every: dict[str, Signal | Sine] = {**self.inputs, **inputs}
-        speeds, twists = dict(self.start.speeds), dict(self.start.twists)
+        tables = self.compute_tables(point, every)
+        for name, numbers in tables["inputs"].items():
+            signal = every[name]
+            assert isinstance(signal, Signal)
+            values = float(numbers["gain"]) * signal.values + float(numbers["offset"])
+            every[name] = replace(signal, values=values, delay=numbers["delay"])
+        for name in self._channels["levels"].difference(inputs):
+            level = float(tables["levels"][name])
+            every[name] = make_input(name, level, (float(time[0]), float(time[-1])))
+        start = Start(tables["speeds"], tables["twists"], self.start.locked)
+        outputs = list(self.outputs.values())
+        return NetworkTask(tables["elements"], every, start, time, outputs, self.accuracy)
+
+    def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
+        """Return the delay [s] of each of `inputs` at `point`."""
+        moved = self.compute_tables(point, inputs)["inputs"]
+        return {
+            name: float(moved[name]["delay"] if name in moved else one.delay)
+            for name, one in inputs.items()
+        }
+
+    def build_channels(self, point: ParameterVector) -> dict[str, Channel]:
+        """Build the channels of the compared outputs at `point`, by name."""
+        moved = self.compute_tables(point)["outputs"] if self._channels["outputs"] else {}
+        return {name: Channel(**moved.get(name, CHANNEL)) for name in self.outputs}
+
+    def show_outputs(
+        self,
+        point: ParameterVector,
+        time: FloatArray,
+        columns: Mapping[Output, FloatArray],
+        *,
+        changes: bool = False,
+    ) -> dict[str, FloatArray]:
+        """Compute the compared outputs (N, ...) over `time` (N,) [s] as their channels show them;
+        of `changes` of the outputs those that they show."""
+        channels = self.build_channels(point)
+        if changes:
+            channels = {name: replace(one, offset=0.0) for name, one in channels.items()}
+        return {name: one.show(time, columns[self.outputs[name]]) for name, one in channels.items()}
+
+    def compute_tables(
+        self, point: ParameterVector, inputs: Mapping[str, Signal | Sine] | None = None
+    ) -> dict[str, Any]:
+        """Compute the numbers of a run at `point`: `elements`, `speeds` and `twists` of the start,
+        `levels` of constant inputs, and of the `inputs` and `outputs` whose channels move.
+
+        Those of `inputs` begin with their delay.
+        """
+        given = inputs or {}
+        channels = {
+            name: {**CHANNEL, "delay": getattr(given.get(name), "delay", 0.0)}
+            for name in self._channels["inputs"]
+        }
+        numbers = Numbers(
+            {
+                "elements": list(self.elements),
+                "speeds": self.start.speeds,
+                "twists": self.start.twists,
+                "levels": self.levels,
+                "inputs": channels,
+                "outputs": dict.fromkeys(self._channels["outputs"], CHANNEL),
+            }
+        )
         for name in self.own:
-            (speeds if name in speeds else twists)[name] = point[self.get_start_name(name)]
-        for place, number in self._iterate_numbers(point):
-            match place:
-                case "delay", str(name):
-                    signal = every[name]
-                    assert isinstance(signal, Signal)
-                    every[name] = replace(signal, delay=number)
-                case "start", str(name):
-                    (speeds if name in speeds else twists)[name] = number
-                case _:
-                    elements.put(place, number)
+            table = "speeds" if name in self.start.speeds else "twists"
+            numbers.put((table, name), point[self.get_start_name(name)])
+        values = {one.name: one.to_value(point[one.name]) for one in self.sought}
+        for setting, place in self._settings:
+            numbers.put(place.keys, setting.compute(*(values[name] for name in setting.of)))
         for fixed in self.fixed:
             x = point[fixed.coordinate]
-            for place in fixed.places:
-                elements.put(place, fixed.move(elements.get(place), x))
-        start = Start(speeds, twists, self.start.locked)
-        outputs = list(self.outputs.values())
-        return NetworkTask(elements.listed, every, start, time, outputs, self.accuracy)
+            for keys in fixed.places:
+                numbers.put(keys, fixed.move(numbers.get(keys), x))
+        return numbers.tables
+
+
+def _is_common(place: Place) -> bool:
+    """Return whether runs side by side have a number in common: of a channel or a table."""
+    is_own = place.field == "start" or place.keys[0] == "elements"
+    return not (is_own and place.schema.differentiable)
 
 
 _SHARE, _STEP = 1e-3, 0.1

@@ -173,7 +173,7 @@ class NetworkRecord(ComparedOutputs):
         if every == 1:
             return self
         stamps = [self.time[out.place[::every]] for out in self.outputs]
-        time = np.unique(np.concatenate([self.time[:1], *stamps]))
+        time = np.unique(np.concatenate([self.time[:1], *stamps, self.time[-1:]]))
         outputs = tuple(
             replace(
                 out.select(slice(None, None, every)),
@@ -253,7 +253,8 @@ def build_network_record(
     outputs
         Names of the compared quantities, in their order.
     reach
-        Time [s] by which an input may act earlier or later than it is stamped, by name.
+        Time [s] by which an input may act, or an output be sampled, earlier or later than it is
+        stamped, by name.
 
     Raises
     ------
@@ -276,6 +277,10 @@ def build_network_record(
             raise InputError(what, "record the outputs over the same time as the inputs")
         compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
     stamps = np.unique(np.concatenate([one.time for one in compared.values()]))
+    for name, one in compared.items():  # simulated as early and as late as it may be sampled
+        ends = stamps[0] + reach.get(name, 0.0), stamps[-1] - reach.get(name, 0.0)
+        inside = (one.time >= ends[0]) & (one.time <= ends[1])
+        compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
     between = [float(np.median(np.diff(one.time))) for one in inputs.values()]
     time = fill_grid(stamps, max(min(between, default=RECORD.grid_step), RECORD.grid_step))
     samples = tuple(

@@ -22,7 +22,6 @@ from drivetwin.estimation.optimize.gauss_newton import (
     minimise,
 )
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.term import Problem
 
@@ -92,14 +91,15 @@ def _extend(
 ) -> tuple[Problem, ParameterVector]:
     """Return the problem and its point with the coordinates of the fixed numbers behind."""
     size, count = len(point.names), len(fixed)
-    precision = np.eye(size + count)
-    precision[:size, :size] = problem.prior.precision
+    prior = problem.prior
+    for _ in fixed:
+        prior = prior.append(0.0, 1.0)
     terms = [replace(one, plant=replace(one.plant, fixed=fixed)) for one in problem.terms]
     reach = np.full(count, RELEASE.reach)
     wider = replace(
         problem,
         terms=tuple(terms),
-        prior=Prior(np.append(problem.prior.mean, np.zeros(count)), precision),
+        prior=prior,
         lower=np.append(problem.lower, -reach),
         upper=np.append(problem.upper, reach),
         reach=np.append(np.broadcast_to(problem.reach, size), reach),

@@ -31,11 +31,12 @@ from drivetwin.estimation.result.verdict import (
     compute_correlation,
 )
 from drivetwin.findings import Code, Finding, Number, Severity, report
+from drivetwin.fit.expression import DerivedNumber, ResolvedNumbers
 from drivetwin.fit.fixed_numbers import FixedNumber, Source, Tolerance
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.search import FoundMinimum, RefinedStart
 from drivetwin.fit.term import NetworkTerm, Problem
-from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.fit.unknown import PlacedNumber, SoughtNumber
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.vehicle.spec import PriorValue
 
@@ -148,10 +149,11 @@ class MovedNumber:
 class ModelFit(EstimatesMixin):
     """Result of a fit.
 
-    `estimates` by name of the unknown; `intervals` are their 95 % intervals, those of a positive
-    number by its logarithm. `starts` are the minima that the refined starts led to, `agreeing` the
-    number of those in the best one. `agreement` compares the simulation with each recording, by
-    output. `moved` are the numbers beside the unknowns that are coordinates of the minimum.
+    `estimates` by name of the unknown, those of its functions `derived` after them; `intervals` are
+    their 95 % intervals, those of a positive number by its logarithm. `starts` are the minima that
+    the refined starts led to, `agreeing` the number of those in the best one. `agreement` compares
+    the simulation with each recording, by output. `moved` are the numbers beside the unknowns that
+    are coordinates of the minimum.
     """
 
     model: NetworkModel
@@ -166,6 +168,7 @@ class ModelFit(EstimatesMixin):
     findings: tuple[Finding, ...]
     status: ModelStatus
     moved: tuple[MovedNumber, ...] = ()
+    derived: Sequence[DerivedNumber] = ()
 
     @property
     def problem(self) -> Problem:
@@ -189,17 +192,22 @@ class ModelFit(EstimatesMixin):
 
     @property
     def values(self) -> dict[str, float]:
-        """Values at the minimum by name of the unknown, SI, whatever their verdicts."""
-        return {one.name: one.to_value(self.minimum.point[one.name]) for one in self.sought}
+        """Values at the minimum by name of the unknown or function, SI, whatever their verdicts."""
+        return {one.name: value for one, value, _ in self._coordinates}
 
     @property
     def std(self) -> dict[str, float]:
-        """Standard deviations of the values by name of the unknown, SI, whatever their verdicts."""
-        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        """Standard deviations of the values by name, SI, whatever their verdicts."""
         return {
-            one.name: float(std) * (value if one.is_positive else 1.0)
-            for one, std, value in zip(self.sought, spread, self.values.values(), strict=False)
+            one.name: std * (value if one.is_positive else 1.0)
+            for one, value, std in self._coordinates
         }
+
+    @property
+    def _coordinates(self) -> list[tuple[PlacedNumber, float, float]]:
+        numbers = ResolvedNumbers(list(self.sought), list(self.derived))
+        found = list_coordinates(numbers, self.minimum.point, self.covariance)
+        return [(one, one.to_value(place), std) for one, place, std in found]
 
     @property
     def correlation(self) -> FloatArray:
@@ -216,7 +224,7 @@ class ModelFit(EstimatesMixin):
         run = simulate(task.elements, task.inputs, task.start, task.time, outputs)
         speeds = {output[1]: float(run.columns[output][0]) for output in outputs}
         unknowns = {
-            one.name: replace(one.unknown, value=self.values[one.name]) for one in self.sought
+            one.name: replace(one.stated, value=self.values[one.name]) for one in self.sought
         }
         written = {  # the digits of a moved number are not those that were written
             one.number.name: Tolerance(one.number.std)
@@ -227,6 +235,7 @@ class ModelFit(EstimatesMixin):
             self.model,
             tolerances={**written, **self.model.tolerances},
             elements=task.elements,
+            inputs={**self.model.inputs, **term.plant.compute_tables(self.minimum.point)["levels"]},
             start=replace(task.start, speeds=speeds),
             unknowns=unknowns,
         )
@@ -285,17 +294,33 @@ class ModelFit(EstimatesMixin):
         }
 
 
-def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMinimum) -> ModelFit:
+def list_coordinates(
+    numbers: ResolvedNumbers, point: ParameterVector, covariance: FloatArray
+) -> list[tuple[PlacedNumber, float, float]]:
+    """List the unknowns and the functions of them with their coordinates at a point, and the
+    standard deviations of these."""
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
+    found: list[tuple[PlacedNumber, float, float]] = [
+        (one, point[one.name], std) for one, std in zip(numbers.sought, spread, strict=False)
+    ]
+    for one in numbers.derived:
+        coordinate, slopes = one.linearise(point)
+        found.append(
+            (one, coordinate, float(np.sqrt(np.maximum(slopes @ covariance @ slopes, 0.0))))
+        )
+    return found
+
+
+def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum) -> ModelFit:
     """Judge the unknowns and the model at a minimum."""
-    minimum = found.result
+    minimum, sought = found.result, numbers.sought
     problem, chi2 = minimum.problem, _compute_chi2(minimum)
     covariance = compute_covariance(problem, minimum.normal, chi2)
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     estimates, intervals = {}, {}
-    for one, coordinate, std in zip(sought, minimum.point.values, spread, strict=False):
-        estimates[one.name] = _judge(one, float(coordinate), float(std))
-        ends = coordinate + Z95 * std * np.array([-1.0, 1.0])
-        intervals[one.name] = (one.to_value(float(ends[0])), one.to_value(float(ends[1])))
+    for one, coordinate, std in list_coordinates(numbers, minimum.point, covariance):
+        estimates[one.name] = _judge(one, coordinate, std)
+        low, high = (one.to_value(coordinate + side * Z95 * std) for side in (-1.0, 1.0))
+        intervals[one.name] = (low, high)
     agreement = tuple(term.compare(minimum.point) for term in problem.terms)
     failures = tuple(find_failures(problem.terms, minimum.normal.residuals, agreement, chi2))
     doubts = find_doubts(problem.terms, agreement, failures, chi2)
@@ -323,6 +348,7 @@ def conclude(model: NetworkModel, sought: Sequence[SoughtNumber], found: FoundMi
         findings,
         judge_status(failures, findings, estimates),
         moved,
+        numbers.derived,
     )
 
 
@@ -349,15 +375,15 @@ def _compute_chi2(minimum: OptimizeResult[Problem]) -> float:
     return (minimum.normal.cost - prior) / minimum.problem.size
 
 
-def _judge(one: SoughtNumber, coordinate: float, std: float) -> Estimate:
-    """Return the estimate of an unknown from its coordinate and its standard deviation."""
+def _judge(one: PlacedNumber, coordinate: float, std: float) -> Estimate:
+    """Return the estimate of a number from its coordinate and its standard deviation."""
     value = one.to_value(coordinate)
     numbers = one.name, value, value * std if one.is_positive else std
-    if one.unknown.std is None:
+    stated, known = one.stated.value, one.stated.std
+    if stated is None or known is None:
         return assess(*numbers, METHOD, spec=one.spec)
     # The prior of a positive number is relative: its spread at the estimate.
-    scale = value / one.unknown.value if one.is_positive else 1.0
-    prior = PriorValue(one.unknown.value, one.unknown.std * scale)
+    prior = PriorValue(stated, known * (value / stated if one.is_positive else 1.0))
     return assess_with_prior(numbers, prior, WITH_PRIOR, declared=one.spec)
 
 

@@ -246,8 +246,7 @@ class _Screen:
         self.sought = sought
         self.rng = rng
         # Runs side by side have their delays and tables in common.
-        delays = (one.name for one in sought if any(p.startswith("delay.") for p in one.factors))
-        self.still = {*problem.terms[0].plant.list_undifferentiated(), *delays}
+        self.still = problem.terms[0].plant.list_common()
         self.draws = np.empty((0, len(sought)))
         self.scores = np.empty(0)
 
@@ -260,10 +259,9 @@ class _Screen:
             draws = self._draw_about_best(number)
         moving = np.array([one.name not in self.still for one in self.sought])
         draws = np.where(moving, draws, [one.start for one in self.sought])
-        drawn = [one for one in self.sought if one.name not in self.still]
         scores = np.zeros(len(draws))
         for term in self.problem.terms:
-            scores += _compute_scores(term, self.start, drawn, draws[:, moving])
+            scores += _compute_scores(term, self.start, draws)
         self.draws = np.concatenate([self.draws, draws])
         self.scores = np.concatenate([self.scores, scores])
         order = np.argsort(scores, kind="stable")[: FIT_SEARCH.round_starts]
@@ -277,7 +275,7 @@ class _Screen:
     def _draw_prior(self, one: SoughtNumber) -> FloatArray:
         """Draw coordinates of an unknown from its prior or bounds, the first guess as the first."""
         low, high = one.limits
-        if one.spread is None and None not in one.unknown.bounds:
+        if one.spread is None and None not in one.stated.bounds:
             values = self.rng.uniform(low, high, FIT_SEARCH.draws)
         else:
             values = one.start + _get_spread(one) * self.rng.standard_normal(FIT_SEARCH.draws)
@@ -300,26 +298,23 @@ def _get_spread(one: SoughtNumber) -> float:
     if one.spread is not None:
         return one.spread
     low, high = one.limits
-    if None not in one.unknown.bounds:
+    if None not in one.stated.bounds:
         return float((high - low) / np.sqrt(12.0))
     return FIT_SEARCH.usual_spread * (1.0 if one.is_positive else abs(one.start))
 
 
-def _compute_scores(
-    term: NetworkTerm, start: ParameterVector, sought: Sequence[SoughtNumber], draws: FloatArray
-) -> FloatArray:
-    """Compute the misfit of each draw: -2 log likelihood with a noise of each output that is
-    unknown beyond that of its sensor; infinite where the run fails."""
+def _compute_scores(term: NetworkTerm, start: ParameterVector, draws: FloatArray) -> FloatArray:
+    """Compute the misfit of each of `draws` (n, k) of the unknowns of the network: -2 log
+    likelihood with a noise of each output that is unknown beyond that of its sensor; infinite where
+    the run fails."""
     task = term.plant.build_task(start, term.record.inputs, term.record.time)
+    channels = term.plant.build_channels(start)
     measured = np.full((len(task.outputs), term.record.time.size), np.nan)
     for row, out in zip(measured, term.record.outputs, strict=True):
-        row[out.place] = out.values
-    sets = {
-        path: factor * (np.exp(column) if one.is_positive else column)
-        for one, column in zip(sought, draws.T, strict=True)
-        for path, factor in one.factors.items()
-    }
+        own = channels[out.name]
+        row[out.place] = (out.values - own.offset) / own.gain
     scenario = NetworkScenario(task.inputs, task.start)
+    sets = term.plant.compute_sets(draws)
     found = simulate_network_batch(
         task.elements, [scenario], task.time, task.outputs, sets, keep=list(measured)
     )

@@ -34,15 +34,15 @@ class StartGuess:
     priors: Mapping[str, PriorValue]
 
 
-def list_starts(stated: Start, elements: Sequence[Element]) -> list[str]:
-    """List the nodes and shafts whose start may be known or sought."""
-    springs = [str(one["name"]) for one in elements if "stiffness" in one]
-    return list(dict.fromkeys([*stated.speeds, *springs, *stated.twists]))
+def complete_start(stated: Start, elements: Sequence[Element]) -> Start:
+    """Return a start with the twist of each shaft: 0 where none is stated."""
+    springs = {str(one["name"]): 0.0 for one in elements if "stiffness" in one}
+    return Start(stated.speeds, {**springs, **stated.twists}, stated.locked)
 
 
 def guess_start(
     stated: Start,
-    known: Mapping[str, float],
+    known: Mapping[str, PriorValue],
     elements: Sequence[Element],
     outputs: Mapping[str, Output],
     record: NetworkRecord,
@@ -55,7 +55,8 @@ def guess_start(
         Start of the model: the nodes whose speeds determine all others, first guesses, elements
         without slip.
     known
-        Speeds [rad/s] and twists [rad] that are known at the start of this recording.
+        Speeds [rad/s] and twists [rad] that are known at the start of this recording, those with a
+        standard deviation within it.
     elements
         Elements of the network; each of its shafts has a twist.
     outputs
@@ -65,7 +66,7 @@ def guess_start(
     """
     springs = {str(one["name"]): one for one in elements if "stiffness" in one}
     speeds = dict(stated.speeds)
-    twists = {**dict.fromkeys(springs, 0.0), **stated.twists}
+    twists = dict(complete_start(stated, elements).twists)
     first = _read_first_values(outputs, record)
     for name in speeds:
         speeds[name] = first.get(("speed", name), speeds[name])
@@ -74,8 +75,8 @@ def guess_start(
         if torque is not None:
             twists[name] = torque / float(one["stiffness"])
     known = {name: value for name, value in known.items() if name in (*speeds, *twists)}
-    for name, value in known.items():
-        (speeds if name in speeds else twists)[name] = value
+    for name, given in known.items():
+        (speeds if name in speeds else twists)[name] = given.value
     fastest = max([1.0, *map(abs, speeds.values()), *map(abs, first.values())])
     priors = {
         name: PriorValue(value, _SPEED_SHARE * fastest)
@@ -88,6 +89,7 @@ def guess_start(
             stiffness = float(springs[name]["stiffness"]) if name in springs else 0.0
             usual = largest / stiffness if stiffness > 0.0 and largest > 0.0 else _USUAL_TWIST
             priors[name] = PriorValue(value, _TWIST_FACTOR * max(abs(value), usual))
+    priors |= {name: one for name, one in known.items() if one.std > 0.0}
     return StartGuess(Start(speeds, twists, stated.locked), priors)
 
 

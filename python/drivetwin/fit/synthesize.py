@@ -23,10 +23,9 @@ from drivetwin.fit.model_file import ModelChannels, format_model, read_model
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.plant import Plant
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
-from drivetwin.fit.unknown import resolve_unknown
+from drivetwin.fit.unknown import get_factors
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import simulate
-from drivetwin.simulation.network_sensitivity import get_number
 
 
 class ModelName(StrEnum):
@@ -102,7 +101,7 @@ def synthesize_log(
     return SynthesizedLog(
         _format_log(model, channels, time, columns),
         format_json({"truth": _read_truth(model), "seed": seed}),
-        format_model(_guess(model), replace(channels, run=None, sigma={})),
+        format_model(_guess(model, channels), replace(channels, run=None, sigma={})),
     )
 
 
@@ -120,22 +119,26 @@ def _simulate(
 
 
 def _read_truth(model: NetworkModel) -> dict[str, float]:
-    """Read the numbers of the unknowns from the elements, by the first of their paths."""
+    """Read the numbers of the unknowns from the elements, by the first of their paths, of
+    those that act on one."""
     found = {}
+    places = model.list_places(())
     for name, unknown in model.unknowns.items():
-        path, factor = next(iter(unknown.get_factors(name).items()))
-        if not path.startswith(("start.", "delay.")):
-            found[name] = get_number(model.elements, path) / factor
+        for path, factor in [*get_factors(name, unknown.paths).items()][:1]:
+            if path in places and places[path].keys[0] == "elements":
+                found[name] = places[path].value / factor
     return found
 
 
-def _guess(model: NetworkModel) -> NetworkModel:
+def _guess(model: NetworkModel, channels: ModelChannels) -> NetworkModel:
     """Return the model with the first guesses in its elements."""
-    resolved = [resolve_unknown(name, one, model.elements) for name, one in model.unknowns.items()]
-    sought = [replace(one, is_positive=False) for one in resolved]  # as written: no logarithm
+    places = model.list_places(channels.inputs)
+    numbers = model.resolve(places)
+    sought = [replace(one, is_positive=False) for one in numbers.sought]  # as written: no logarithm
     names = tuple(one.name for one in sought)
     point = ParameterVector(names, np.array([one.start for one in sought]))
-    plant = Plant(model.elements, {}, model.start, model.outputs, sought)
+    settings = [one for one in numbers.settings if places[one.path].keys[0] == "elements"]
+    plant = Plant(model.elements, {}, model.start, model.outputs, sought, settings, places)
     return replace(model, elements=plant.build_task(point, {}, np.zeros(0)).elements)
 
 

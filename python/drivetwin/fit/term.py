@@ -78,15 +78,16 @@ class NetworkTerm:
             run = self.simulate(point)
         except InputError:
             return None
-        return self._compute_residual(run)
+        return self._compute_residual(point, run)
 
     def compare(self, point: ParameterVector) -> dict[str, SignalFit]:
         """Compare the simulation at `point` with the recording, by output."""
         run = self.simulate(point)
+        shown = self.plant.show_outputs(point, run.time, run.columns)
         return {
             out.name: compute_fit(
                 out.values,
-                out.sample(self.record.time, run.columns[self.plant.outputs[out.name]]),
+                out.sample(self.record.time, shown[out.name]),
                 float(np.mean(out.values)),
             )
             for out in self.record.outputs
@@ -102,10 +103,10 @@ class NetworkTerm:
             found = task.differentiate(len(point.names))
         except InputError:
             return None
-        residual = self._compute_residual(found.run)
+        residual = self._compute_residual(point, found.run)
         if residual is None:
             return None
-        by_name = {name: found.derivatives[output] for name, output in self.plant.outputs.items()}
+        by_name = self.plant.show_outputs(point, self.record.time, found.derivatives, changes=True)
         slopes = self.record.sample(by_name)
         for name in apart:
             column = self._compute_slope(point, name, residual)
@@ -128,12 +129,12 @@ class NetworkTerm:
                 return np.asarray((residual - there) / side)
         return None
 
-    def _compute_residual(self, run: NetworkRun) -> FloatArray | None:
+    def _compute_residual(self, point: ParameterVector, run: NetworkRun) -> FloatArray | None:
         """Compute measured minus simulated (n,), the latter as for the measured inputs; None for
         a run that did not reach its end with residuals that can be squared."""
         if run.status != "completed":
             return None
-        columns = {name: run.columns[output] for name, output in self.plant.outputs.items()}
+        columns = self.plant.show_outputs(point, run.time, run.columns)
         residual = self.record.measured - self.record.sample(columns) - self.returned
         with np.errstate(invalid="ignore"):
             is_small = np.abs(residual) < OBJECTIVE.max_residual * self.record.sigma
@@ -168,7 +169,11 @@ class NetworkTerm:
         response = LinearResponse(step, found.transition, drive)
         if not response.finite:
             return None
-        rows = {name: found.rows[output] for name, output in self.plant.outputs.items()}
+        shown = self.plant.build_channels(point)
+        rows = {
+            name: shown[name].gain * found.rows[output]
+            for name, output in self.plant.outputs.items()
+        }
         delays = self.plant.get_delays(point, record.inputs)
         power = record.compute_power(drive, delays)
         direct = {  # derivatives (N,) by prescribed speeds
@@ -181,7 +186,7 @@ class NetworkTerm:
         }
         seen = [
             SeenOutput(rows[out.name], out.centre, _add_direct_noise(out, direct[out.name], power))
-            for out in record.outputs
+            for out in (shown[one.name].find_shown(one, record.time) for one in record.outputs)
         ]
         quiet = self.quiet
         if quiet is None:
@@ -195,8 +200,11 @@ class NetworkTerm:
         held_back = {name: 0.5 * (at_points[name][1:] + at_points[name][:-1]) for name in drive}
         z = response.propagate_inputs(held_back)
         columns = {
-            name: np.einsum("ks,ks->k", row, z)
-            + sum(own * at_points[of] for of, own in direct[name].items())
+            name: shown[name].shift(
+                record.time,
+                np.einsum("ks,ks->k", row, z)
+                + sum(own * at_points[of] for of, own in direct[name].items()),
+            )
             for name, row in rows.items()
         }
         return replace(self, weighting=weighting, returned=record.sample(columns), quiet=quiet)
@@ -205,9 +213,11 @@ class NetworkTerm:
         task = self.plant.build_task(point, self.record.inputs, self.record.time)
         outputs = list(dict.fromkeys(task.outputs))
         try:
-            return compute_response(task.elements, task.inputs, task.start, task.time, outputs)
+            found = compute_response(task.elements, task.inputs, task.start, task.time, outputs)
         except InputError:
             return None
+        moved = self.plant.compute_tables(point)["inputs"]
+        return found and found.scale_inputs({name: float(moved[name]["gain"]) for name in moved})
 
 
 Problem = LikelihoodObjective[NetworkTerm]

@@ -4,17 +4,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, Field
 
-from drivetwin.errors import InputError, suggest_spelling
+from drivetwin.errors import InputError
+from drivetwin.fit.places import Place, find_place
 from drivetwin.parameters import ParameterSpec
-from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind
 from drivetwin.simulation.element_schema import Field as ElementField
+from drivetwin.simulation.variable import exp, log
 
+Paths = Mapping[str, float] | Sequence[str] | None
+"""Paths of a number, with a factor for each where it is a table; None for its name."""
 Bounds = tuple[float | None, float | None]
 """Least and largest value, None where there is none."""
 
@@ -52,7 +55,7 @@ class Unknown:
     bounds: Annotated[
         Bounds, BeforeValidator(_read_bounds, json_schema_input_type=tuple[float, float])
     ] = (None, None)
-    paths: Mapping[str, float] | Sequence[str] | None = None
+    paths: Paths = None
 
     @classmethod
     def read(cls, stated: Unknown | tuple[float, float] | float) -> Unknown:
@@ -61,39 +64,80 @@ class Unknown:
             return stated
         return cls(*stated) if isinstance(stated, Sequence) else cls(stated)
 
-    def get_factors(self, name: str) -> dict[str, float]:
-        """Return the factor of each path of the unknown with this name."""
-        if self.paths is None:
-            return {name: 1.0}
-        if isinstance(self.paths, Mapping):
-            return {path: float(factor) for path, factor in self.paths.items()}
-        return dict.fromkeys(self.paths, 1.0)
+
+def get_factors(name: str, paths: Paths) -> dict[str, float]:
+    """Return the factor of each path on which a number with a name acts."""
+    if paths is None:
+        return {name: 1.0}
+    if isinstance(paths, Mapping):
+        return {path: float(factor) for path, factor in paths.items()}
+    return dict.fromkeys(paths, 1.0)
 
 
-@dataclass(frozen=True)
-class SoughtNumber:
-    """Unknown resolved against a network: a coordinate of the search.
+class Setting(NamedTuple):
+    """Number at a `path` as a function of unknowns: `compute` of their values, in the order of the
+    names `of`."""
 
-    A number that is positive by its law is sought by its logarithm. `factors` are those of its
-    paths.
+    path: str
+    of: tuple[str, ...]
+    compute: Callable[..., float]
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedNumber:
+    """Number resolved against a network: it acts on the paths of `factors`.
+
+    `stated` has its value, or mean of the prior, and standard deviation. The coordinate of a number
+    that is positive by its law is its logarithm.
     """
 
     name: str
-    unknown: Unknown
+    stated: Any
     factors: Mapping[str, float]
     is_positive: bool
     spec: ParameterSpec
 
     @property
     def start(self) -> float:
-        """Coordinate of the first guess."""
-        return self.to_coordinate(self.unknown.value)
+        """Coordinate of the stated value."""
+        return self.to_coordinate(self.stated.value)
 
     @property
     def spread(self) -> float | None:
         """Standard deviation of the prior of the coordinate; None where nothing is known."""
-        std = self.unknown.std
-        return std if std is None or not self.is_positive else std / self.unknown.value
+        std: float | None = self.stated.std
+        return std / float(self.stated.value) if std is not None and self.is_positive else std
+
+    def to_coordinate(self, value: float) -> float:
+        """Return the coordinate of a value; it carries the derivatives of the value."""
+        return log(value) if self.is_positive else value
+
+    def to_value(self, coordinate: float) -> float:
+        """Return the value at a coordinate; it carries the derivatives of the coordinate."""
+        return exp(coordinate) if self.is_positive else coordinate
+
+    def make_settings(self, of: tuple[str, ...], compute: Callable[..., float]) -> list[Setting]:
+        """Return the numbers on which it acts, by a function of the unknowns `of`."""
+
+        def scale(factor: float) -> Callable[..., float]:
+            return lambda *values: factor * compute(*values)
+
+        return [
+            Setting(path, of, compute if factor == 1.0 else scale(factor))
+            for path, factor in self.factors.items()
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class SoughtNumber(PlacedNumber):
+    """Unknown resolved against a network: a coordinate of the search."""
+
+    stated: Unknown
+
+    @property
+    def settings(self) -> list[Setting]:
+        """Numbers on which it acts."""
+        return self.make_settings((self.name,), lambda value: value)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -103,49 +147,56 @@ class SoughtNumber:
             return low, high
         return (math.log(low) if low > 0.0 else -math.inf), math.log(high)
 
-    def to_coordinate(self, value: float) -> float:
-        """Return the coordinate of a value."""
-        return math.log(value) if self.is_positive else value
-
-    def to_value(self, coordinate: float) -> float:
-        """Return the value at a coordinate."""
-        return math.exp(coordinate) if self.is_positive else coordinate
-
 
 def resolve_unknown(
-    name: str, unknown: Unknown, elements: Sequence[Mapping[str, Any]]
+    name: str, unknown: Unknown, places: Mapping[str, Place], *, named: bool = False
 ) -> SoughtNumber:
-    """Resolve an unknown against the elements of a network.
+    """Resolve an unknown against the numbers of a network.
 
-    Raises InputError for a path that leads to no number, naming the known ones, for a value beyond
-    its bounds or the limits of the field, and for a prior that is no spread.
+    An unknown that an expression has `named` needs no path. Raises InputError for a path that leads
+    to no number, naming the known ones, for a value beyond its bounds or the limits of the field,
+    and for a prior that is no spread.
     """
-    factors = unknown.get_factors(name)
-    if not factors:
+    factors = get_factors(name, unknown.paths)
+    if named and unknown.paths is None and name not in places:
+        factors = {}
+    if not factors and not named:
         raise InputError(f"{name}: there is no path", "name at least one path that it acts on")
-    if not all(math.isfinite(factor) and factor != 0.0 for factor in factors.values()):
-        raise InputError(f"{name}: a factor is zero or no number", "leave that path out")
-    found_fields = {path: _find_field(path, elements) for path in factors}
-    fields = [(one, factors[path]) for path, one in found_fields.items() if one is not None]
-    low, high = (_bound(unknown.bounds[k], fields, k) for k in (0, 1))
-    first = fields[0][0] if fields else None
-    spec = ParameterSpec(
-        stem=name,
-        name=name,
-        symbol=name,
-        unit=_get_unit(next(iter(factors)), first),
-        meaning=first.help if first else "",
-        lower=low,
-        upper=high,
-    )
-    is_positive = low >= 0.0 and unknown.value > 0.0 and bool(fields)
+    spec, is_scale = describe_places(name, factors, places, unknown.bounds)
+    is_positive = spec.lower >= 0.0 and unknown.value > 0.0 and is_scale
     found = SoughtNumber(name, unknown, factors, is_positive, spec)
     _require_sound(found)
     return found
 
 
+def describe_places(
+    name: str, factors: Mapping[str, float], places: Mapping[str, Place], bounds: Bounds
+) -> tuple[ParameterSpec, bool]:
+    """Describe a number that acts on paths with factors, within bounds.
+
+    The second value is False where zero is a value like others: of starts, delays and offsets.
+    Raises InputError for a path that leads to no number, and for a factor that is none.
+    """
+    if not all(math.isfinite(factor) and factor != 0.0 for factor in factors.values()):
+        raise InputError(f"{name}: a factor is zero or no number", "leave that path out")
+    found = [find_place(path, places) for path in factors]
+    fields = [(one.schema, factors[one.path]) for one in found]
+    low, high = (_bound(bounds[k], fields, k) for k in (0, 1))
+    first = fields[0][0] if fields else None
+    spec = ParameterSpec(
+        stem=name,
+        name=name,
+        symbol=name,
+        unit=(first.unit.translate(ASCII_UNITS) if first else "") or "1",
+        meaning=first.help if first else "",
+        lower=low,
+        upper=high,
+    )
+    return spec, not any(one.field in ("start", "delay", "offset") for one in found)
+
+
 def _require_sound(one: SoughtNumber) -> None:
-    given, name, spec = one.unknown, one.name, one.spec
+    given, name, spec = one.stated, one.name, one.spec
     if not math.isfinite(given.value) or not spec.lower <= given.value <= spec.upper:
         what = f"{name}: the value {given.value:g} is outside {spec.lower:g} to {spec.upper:g}"
         raise InputError(what, "correct the value or its bounds")
@@ -173,71 +224,12 @@ ASCII_UNITS = str.maketrans({"·": "*", "²": "^2", "³": "^3"})
 """Spelling of the units of the parameter table."""
 
 
-def _get_unit(path: str, first: ElementField | None) -> str:
-    if first is not None:
-        return first.unit.translate(ASCII_UNITS) or "1"
-    return "s" if path.startswith("delay.") else "1"
-
-
-def _find_field(path: str, elements: Sequence[Mapping[str, Any]]) -> ElementField | None:
-    """Return the field of the number at a path; None for a start or a delay."""
-    head, *names = path.split(".")
-    if head in ("start", "delay"):
-        return None
-    by_name = {str(one["name"]): one for one in elements}
-    if head not in by_name:
-        hint = suggest_spelling(head, by_name)
-        raise InputError(f"{path}: no element {head!r}{hint}", f"known are {', '.join(by_name)}")
-    place: Any = by_name[head]
-    fields: Mapping[str, ElementField] = ELEMENT_FIELDS[str(place["type"])]
-    found: ElementField | None = None
-    for name in names:
-        if isinstance(place, list | tuple):
-            place = place[int(name)] if name.isdecimal() and int(name) < len(place) else None
-            continue
-        known = _list_numbers(fields, place)
-        if not isinstance(place, Mapping) or name not in fields or name not in place:
-            hint = suggest_spelling(name, known)
-            raise InputError(f"{path}: no field {name!r}{hint}", f"known are {', '.join(known)}")
-        found, place = fields[name], place[name]
-        if found.kind is FieldKind.GROUP:
-            keys = set(place)
-            fields = next((one for one in found.group if keys <= set(one)), found.group[0])
-    if not isinstance(place, int | float) or found is None:
-        listed = ", ".join(_list_numbers(fields, place))
-        remedy = f"known are {listed}" if listed else "name a field with a number, or its place"
-        raise InputError(f"{path} is no number", remedy)
-    return found
-
-
-def require_distinct_places(sought: Iterable[SoughtNumber]) -> None:
-    """Raise InputError for a number that two unknowns set."""
+def require_distinct_places(acting: Mapping[str, Iterable[str]]) -> None:
+    """Raise InputError for a path on which two unknowns or expressions act; paths by name."""
     owners: dict[str, str] = {}
-    for one in sought:
-        for path in one.factors:
+    for name, paths in acting.items():
+        for path in paths:
             if path in owners:
-                what = f"{path}: set by the unknowns {owners[path]!r} and {one.name!r}"
+                what = f"{path}: set by {owners[path]!r} and {name!r}"
                 raise InputError(what, "leave the path to one of them")
-            owners[path] = one.name
-
-
-def require_known_places(
-    sought: Iterable[SoughtNumber], starts: Collection[str], inputs: Collection[str]
-) -> None:
-    """Raise InputError for an unknown start or delay of a name that the network does not have."""
-    known = {"start": ("node or shaft", starts), "delay": ("input", inputs)}
-    for path in (path for one in sought for path in one.factors):
-        head, _, name = path.partition(".")
-        what, names = known.get(head, ("", ()))
-        if what and name not in names:
-            hint = suggest_spelling(name, names)
-            listed = ", ".join(names)
-            raise InputError(f"{path}: the model has no {what} {name!r}{hint}", f"known: {listed}")
-
-
-def _list_numbers(fields: Mapping[str, ElementField], place: Any) -> list[str]:
-    """List the fields of an element or group that hold numbers, or groups of them."""
-    if not isinstance(place, Mapping):
-        return []
-    wanted = (FieldKind.NUMBER, FieldKind.NUMBERS, FieldKind.ROWS, FieldKind.GROUP)
-    return [name for name, one in fields.items() if one.kind in wanted and name in place]
+            owners[path] = name

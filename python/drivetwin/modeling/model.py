@@ -20,6 +20,7 @@ import numpy as np
 
 from drivetwin.errors import suggest_spelling
 from drivetwin.export.modelica.model import Run, format_package
+from drivetwin.fit.expression import Expression
 from drivetwin.fit.fit import fit_network
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.network_model import NetworkModel
@@ -226,6 +227,7 @@ class Model(ElementMethods):
         outputs: Mapping[str, Output],
         *,
         tolerances: Mapping[str, Tolerance] | None = None,
+        expressions: Mapping[str, Expression] | None = None,
         seed: int = 0,
     ) -> ModelFit:
         """Identify numbers of the model from recordings.
@@ -237,13 +239,16 @@ class Model(ElementMethods):
             and twists of the model are first guesses unless a recording states them.
         unknowns
             By path, such as `shaft.stiffness`, `B3.friction.mu_c`, `delay.torque`; or by any name
-            with the paths that share it. A number is a first guess, a pair is value and standard
-            deviation.
+            with the paths that share it. `gain`, `offset` and `delay` of a channel, such as
+            `gain.torque`, and `start` of a node are numbers too. A number is a first guess, a pair
+            is value and standard deviation.
         outputs
             Quantity that each measured output is, by its name in the recordings.
         tolerances
-            Distributions of numbers that are not unknowns, by path, such as `gear.ratio`, or by
-            element where they are exact; usual ones where nothing is stated.
+            Distributions of numbers that are not unknowns, by path, such as `gear.ratio` or
+            `gain.torque`, or by element where they are exact; usual ones where nothing is stated.
+        expressions
+            Functions of unknowns by the path of the number that they set, or by any name.
         seed
             Seed of the draws from which the search starts.
 
@@ -260,7 +265,7 @@ class Model(ElementMethods):
             Where no start leads to a minimum.
         """
         several = [recordings] if isinstance(recordings, Recording) else list(recordings)
-        model = self.describe(unknowns, outputs, tolerances)
+        model = self.describe(unknowns, outputs, tolerances, expressions)
         return fit_network(model, several, seed=seed)
 
     def describe(
@@ -268,16 +273,17 @@ class Model(ElementMethods):
         unknowns: Mapping[str, Unknown | tuple[float, float] | float],
         outputs: Mapping[str, Output],
         tolerances: Mapping[str, Tolerance] | None = None,
+        expressions: Mapping[str, Expression] | None = None,
     ) -> NetworkModel:
-        """Return the network as a model file has it: with unknowns, compared quantities and
-        tolerances.
+        """Return the network as a model file has it: with unknowns, compared quantities, tolerances
+        and functions of unknowns.
 
         Raises InputError with all faults of the model.
         """
         elements = [component.element for component in self.components]
-        start, known = self._resolve_start(), tolerances or {}
         sought = {name: Unknown.read(one) for name, one in unknowns.items()}
-        return NetworkModel(self.name, elements, self.inputs, start, outputs, sought, known)
+        given = elements, self.inputs, self._resolve_start(), outputs, sought
+        return NetworkModel(self.name, *given, tolerances or {}, expressions or {})
 
     def list_outputs(self) -> list[Output]:
         """List everything that a run records."""

@@ -14,6 +14,7 @@ from drivetwin._util.display_units import (
     scale_display,
 )
 from drivetwin.channels.roles import Quantity
+from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Finding
@@ -59,7 +60,8 @@ def render_fit(
 ) -> str:
     """HTML text of the page; equal fits give equal text."""
     terms = zip(logs, found.problem.terms, found.simulate(), strict=True)
-    figures = [FigureBlock(plot_recording(term, run), f"{log}.") for log, term, run in terms]
+    point = found.minimum.point
+    figures = [FigureBlock(plot_recording(term, point, run), f"{log}.") for log, term, run in terms]
     sections = [
         Section("result", "Result", "", [_build_verdict(found), *_build_parameters(found)]),
         build_findings_section((*remarks, *found.findings)),
@@ -137,13 +139,14 @@ def _build_fixed_row(one: MovedNumber) -> tuple[str, ...]:
     return number.name, *texts, display.label, str(number.source), widened
 
 
-def plot_recording(term: NetworkTerm, run: NetworkRun) -> Figure:
+def plot_recording(term: NetworkTerm, point: ParameterVector, run: NetworkRun) -> Figure:
     """Draw the outputs of a recording, measured and simulated, and the inputs below."""
     panels = []
+    shown = term.plant.show_outputs(point, run.time, run.columns)
     for out in term.record.outputs:
         output = term.plant.outputs[out.name]
         curves = [
-            Curve("simulated", run.time, run.columns[output], SIMULATED, UNDER),
+            Curve("simulated", run.time, shown[out.name], SIMULATED, UNDER),
             Curve("measured", term.record.time[out.place], out.values, MEASURED, OVER),
         ]
         panels.append(Panel(out.name, _get_display(get_output_quantity(output)), curves))

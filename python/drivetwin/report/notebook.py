@@ -99,7 +99,8 @@ def _(model: ValidatedModel) -> Figure:
 @_plot.register
 def _(found: ModelFit) -> Figure:
     """Draw the first recording."""
-    return plot_recording(found.problem.terms[0], found.simulate()[0])
+    term, run = found.problem.terms[0], found.simulate()[0]
+    return plot_recording(term, found.minimum.point, run)
 
 
 @_plot.register

@@ -48,6 +48,14 @@ class NetworkResponse:
     rows: Mapping[Output, FloatArray]
     offset: Mapping[str, FloatArray] = field(default_factory=dict)
 
+    def scale_inputs(self, gains: Mapping[str, float]) -> NetworkResponse:
+        """Return the response by signals of which the inputs are multiples, 1 without a gain."""
+        drive, offset = (
+            {name: gains.get(name, 1.0) * one for name, one in table.items()}
+            for table in (self.drive, self.offset)
+        )
+        return replace(self, drive=drive, offset=offset)
+
 
 def compute_response(
     elements: Sequence[Element],

@@ -22,8 +22,8 @@ Seeded = tuple[float, list[tuple[int, float]]]
 class Variable(float):
     """Number with its derivatives `slopes` (p,) by p unknowns.
 
-    Sums, products, quotients, powers, magnitudes and `exp` keep the derivatives; comparisons are
-    those of the value. Functions of NumPy are refused.
+    Sums, products, quotients, powers, magnitudes, `exp` and `log` keep the derivatives; comparisons
+    are those of the value. Functions of NumPy are refused.
     """
 
     slopes: FloatArray
@@ -66,8 +66,13 @@ class Variable(float):
 
     def __pow__(self, power: float, modulus: None = None) -> Variable:
         del modulus
-        base = float(self)
-        return Variable(base**power, power * base ** (power - 1.0) * self.slopes)
+        base, order = float(self), float(power)
+        value = math.pow(base, order)  # no complex number of a negative base
+        by_power = value * math.log(base) if isinstance(power, Variable) else 0.0
+        return _combine(self, power, value, order * math.pow(base, order - 1.0), by_power)
+
+    def __rpow__(self, base: float, modulus: None = None) -> Variable:
+        return Variable(base, 0.0 * self.slopes).__pow__(self, modulus)
 
 
 def exp(number: float) -> float:
@@ -77,6 +82,12 @@ def exp(number: float) -> float:
     except OverflowError:
         value = math.inf
     return Variable(value, value * number.slopes) if isinstance(number, Variable) else value
+
+
+def log(number: float) -> float:
+    """Compute the natural logarithm."""
+    value = math.log(number)
+    return Variable(value, number.slopes / float(number)) if isinstance(number, Variable) else value
 
 
 def seed(number: float, lanes: Sequence[int]) -> Seeded:

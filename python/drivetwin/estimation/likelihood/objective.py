@@ -132,7 +132,8 @@ class LikelihoodObjective(Generic[T]):
     def update_weighting(self, point: ParameterVector) -> Self:
         """Compute the covariance with input noise at `point`."""
         charge(WEIGHTING)
-        return replace(self, terms=tuple(term.update_weighting(point) for term in self.terms))
+        terms = tuple(term.update_weighting(point) for term in self.terms)
+        return replace(self, terms=terms, prior=self.prior.linearise(point.values))
 
     def update_inputs(self, point: ParameterVector) -> Self:
         """Drive the problem by the expected inputs at `point`, weighted there."""

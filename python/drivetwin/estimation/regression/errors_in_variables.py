@@ -76,6 +76,11 @@ class Prior:
         precision[index, index] = 1e18
         return Prior(mean, precision)
 
+    def linearise(self, theta: FloatArray) -> Prior:
+        """Return the prior with a precision that holds at `theta` (p,): itself, as it is linear."""
+        del theta
+        return self
+
     def compute_gradient(self, theta: FloatArray) -> FloatArray:
         """Precision times (θ - θ₀), shape (p,)."""
         return np.asarray(self.precision @ (theta - self.mean), dtype=float)

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""Numbers of a network and of its channels by path: the places at which coordinates act."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, cast
+
+from drivetwin.channels.roles import Quantity
+from drivetwin.errors import InputError, suggest_spelling
+from drivetwin.fit.number_kinds import BESIDE, USUAL, UsualDeviation
+from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit
+from drivetwin.simulation.element_schema import Field as ElementField
+from drivetwin.simulation.network import Output, Start
+from drivetwin.simulation.serialize import is_number
+
+Keys = tuple[int | str, ...]
+"""Keys that lead to a number of a run: `elements`, `speeds`, `twists`, `levels` of
+constant inputs, `inputs` and `outputs` as channels."""
+
+CHANNEL: Mapping[str, float] = {"gain": 1.0, "offset": 0.0, "delay": 0.0}
+"""Numbers of a channel without errors. A channel is gain · x(t - delay) + offset."""
+
+
+class Place(NamedTuple):
+    """Number by its `path`: the `keys` that lead to it, its schema and value.
+
+    `field` is the path of its field in an element; `usual` the deviation of a number that is not
+    an unknown.
+    """
+
+    path: str
+    keys: Keys
+    field: str
+    schema: ElementField
+    value: float
+    usual: UsualDeviation
+
+
+def list_places(
+    elements: Sequence[Mapping[str, Any]],
+    start: Start,
+    inputs: Iterable[str],
+    levels: Mapping[str, float],
+    outputs: Mapping[str, Output],
+) -> dict[str, Place]:
+    """List the numbers of a network and of its channels by path.
+
+    Parameters
+    ----------
+    elements
+        Elements of the network.
+    start
+        Start with the twist of each shaft.
+    inputs
+        Names of measured inputs.
+    levels
+        Values of constant inputs, SI.
+    outputs
+        Compared quantities by name.
+    """
+    found: list[Place] = []
+    for index, element in enumerate(elements):
+        kinds = USUAL[str(element["type"])]
+        for keys, field, schema, number in iterate_numbers(element):
+            path = ".".join(map(str, (element["name"], *keys)))
+            keys = ("elements", index, *keys)
+            found.append(Place(path, keys, field, schema, number, kinds[field]))
+    shown = {name: get_output_quantity(one) for name, one in outputs.items()}
+    found += _list_channels("outputs", shown)
+    read = {name: find_input_quantity(name, elements) for name in inputs}
+    found += _list_channels("inputs", read)
+    for name, value in levels.items():
+        unit = find_input_quantity(name, elements).unit
+        found.append(_make_place("input", ("levels", name), value, unit, known=False))
+    for table, unit, values in (("twists", "rad", start.twists), ("speeds", "rad/s", start.speeds)):
+        found += [_make_place("start", (table, name), one, unit) for name, one in values.items()]
+    return {one.path: one for one in found}
+
+
+def _list_channels(table: str, quantities: Mapping[str, Quantity]) -> list[Place]:
+    """List the numbers of measured inputs or outputs; the core has derivatives by the delays of
+    inputs alone."""
+    return [
+        _make_place(
+            head,
+            (table, name, head),
+            value,
+            {"gain": "1", "offset": quantity.unit, "delay": "s"}[head],
+            known=table == "inputs" and head == "delay",
+        )
+        for name, quantity in quantities.items()
+        for head, value in CHANNEL.items()
+    ]
+
+
+def _make_place(head: str, keys: Keys, value: float, unit: str, *, known: bool = True) -> Place:
+    limit = Limit(None, 0.0, None, ()) if head == "gain" else None
+    schema = ElementField(
+        FieldKind.NUMBER, False, None, value, known, unit, limit, (), (), f"{head} of {keys[1]}"
+    )
+    return Place(f"{head}.{keys[1]}", keys, head, schema, value, BESIDE[head])
+
+
+def find_place(path: str, places: Mapping[str, Place]) -> Place:
+    """Return the place at a path; raises InputError where there is none, with the known ones."""
+    if path in places:
+        return places[path]
+    stem = path
+    while stem and not any(one.startswith(f"{stem}.") for one in places):
+        stem = stem.rpartition(".")[0]
+    head = f"{stem}." if stem else ""
+    inner = (one[len(head) :] for one in places if one.startswith(head))
+    # Names of inputs and nodes may contain points.
+    known = list(dict.fromkeys(one if head[:-1] in BESIDE else one.split(".")[0] for one in inner))
+    if stem == path:
+        raise InputError(f"{path} is no number", f"known are {', '.join(known)}")
+    first, _, rest = (name := path[len(head) :]).partition(".")
+    name = name if stem in BESIDE or (rest and first in known) else first
+    hint = "" if first in known else suggest_spelling(name, known)
+    raise InputError(f"{path}: no number {name!r}{hint}", f"known are {', '.join(known)}")
+
+
+class Numbers:
+    """Parts of a run, of which each element or table is copied before a number of it changes."""
+
+    def __init__(self, tables: Mapping[str, Any]) -> None:
+        self.tables = {key: copy.copy(one) for key, one in tables.items()}
+        self._copied: set[Keys] = set()
+
+    def get(self, keys: Keys) -> float:
+        """Return the number to which the keys lead."""
+        found: Any = self.tables
+        for key in keys:
+            found = found[key]
+        return cast("float", found)
+
+    def put(self, keys: Keys, number: float) -> None:
+        """Replace the number to which the keys lead."""
+        *path, last = keys[1:]
+        place = self.tables[str(keys[0])]
+        if path and keys[:2] not in self._copied:
+            place[path[0]] = copy.deepcopy(place[path[0]])
+            self._copied.add(keys[:2])
+        for key in path:
+            place = place[key]
+        place[last] = number
+
+
+def iterate_numbers(element: Mapping[str, Any]) -> Iterator[tuple[Keys, str, ElementField, float]]:
+    """Yield the keys, the path of the field, its schema and the value of each number of an
+    element."""
+    fields = ELEMENT_FIELDS[str(element["type"])]
+    waiting: list[tuple[Keys, str, ElementField, Any]] = [
+        ((name,), name, one, element.get(name)) for name, one in fields.items()
+    ]
+    while waiting:
+        keys, field, one, value = waiting.pop(0)
+        if value is None:
+            continue
+        if one.kind is FieldKind.GROUP:
+            inner = next((each for each in one.group if set(value) <= set(each)), one.group[0])
+            waiting += [
+                ((*keys, name), f"{field}.{name}", each, value.get(name))
+                for name, each in inner.items()
+            ]
+        else:
+            yield from (((*keys, *at), field, one, each) for at, each in _iterate_cells(value))
+
+
+def _iterate_cells(value: Any) -> Iterator[tuple[Keys, float]]:
+    """Yield the keys and the value of a number, or of each one of a list or table."""
+    if isinstance(value, list | tuple):
+        for k, each in enumerate(value):
+            yield from (((k, *keys), number) for keys, number in _iterate_cells(each))
+    elif is_number(value):
+        yield (), value
