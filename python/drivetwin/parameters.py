@@ -104,7 +104,7 @@ _SPECS = (
     ),
     ParameterSpec(
         "te_delay", "engine torque delay", "τ_e", "s",
-        "engine-torque signal delay: the log shows it so long after it acts", -1.0, 1.0, "log",
+        "delay of the engine torque signal", -1.0, 1.0, "log",
     ),
     ParameterSpec(
         "p_delay", "pressure delay", "τ_p", "s",
@@ -168,8 +168,8 @@ _BUS = (
         (2.0 * math.pi * _SLOWEST) ** 2, (2.0 * math.pi * _FASTEST) ** 2, "gear",
     ),
     ParameterSpec(
-        "speed_delay", "Delay behind the input speed", "τ", "s",
-        "time by which the bus shows a speed later than the input speed", -1.0, 1.0, "channel",
+        "speed_delay", "Delay relative to the input speed", "τ", "s",
+        "delay of a speed on the bus relative to the input speed", -1.0, 1.0, "channel",
     ),
     ParameterSpec(
         "torque_delay", "Dead time of the torque message", "d", "s",

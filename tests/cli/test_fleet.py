@@ -103,7 +103,7 @@ def test_estimates_are_told(fleet: Path, capsys: pytest.CaptureFixture[str]) -> 
     out = capsys.readouterr().out
     assert "mu.B3" in out
     assert "drift per" in " ".join(out.split())
-    assert "Too few logs with a value of their own" in out
+    assert "Not estimated: from the card in most logs" in out
     assert main(["fleet", "estimate", store, "--parameter", "mu.X9", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"estimates": [], "missing": ["mu.X9"]}
 

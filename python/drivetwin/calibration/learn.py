@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Correction of a twin by logged shifts of one vehicle: the likeliest values after the logs.
 
-The prior is the twin's covariance together with the spread of made units; the likelihood is that of
+The prior is the twin's covariance together with production scatter; the likelihood is that of
 the measured torque and speeds of each shift, simulated from what was commanded. A simulation whose
 clutch locks once has no gradient towards a vehicle whose clutch locks, slips and locks again. So
 draws from the prior are simulated first; Gauss-Newton starts from the best of them.

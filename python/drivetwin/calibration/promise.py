@@ -20,7 +20,7 @@ from drivetwin.calibration.scenarios import Scenarios
 
 UNIT_SHARE = 0.95
 """Share of the units of a type that keep their value."""
-TYPES, UNITS = "vehicle types", "made units"
+TYPES, UNITS = "uncertainty of identified values", "production scatter"
 """Names of the two stages of the draws."""
 ACTUATORS = "actuators"
 """Name of the actuators and the engine lag among the uncertainties."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenarios: drivelines drawn from the identified covariance and the spread of made units.
+"""Scenarios: drivelines drawn from the identified covariance and production scatter.
 
 All profiles of one search run through the same draws (common random numbers), so that differences
 of their metrics are differences of the profiles.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws of actuators: identified covariance, and the spread of made units."""
+"""Draws of actuators: identified covariance, and production scatter."""
 
 from __future__ import annotations
 

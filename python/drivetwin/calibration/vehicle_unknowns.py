@@ -194,7 +194,7 @@ class VehicleUnknowns:
 
     `mean` and `root` (n, m) are those of the prior: values are mean + root·z with z of the standard
     normal distribution, from `lower` (m,) on. The prior is the total covariance of the twin
-    together with the spread of made units, of which the vehicle is one.
+    together with production scatter, of which the vehicle is one.
     """
 
     twin: Twin
@@ -387,7 +387,7 @@ def _insert_axes(root: FloatArray, place: int, stds: Sequence[float]) -> FloatAr
 
 
 def _add_spread(covariance: FloatArray, mean: Mapping[str, float], spread: Spread) -> None:
-    """Add the spread of made units: the scale of the engine torque is one of η and of 1/J1.
+    """Add production scatter: the scale of the engine torque is one of η and of 1/J1.
 
     J′ is that of J1·η and stays. The contact pressure is common to both clutches.
     """

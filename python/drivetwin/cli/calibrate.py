@@ -97,7 +97,7 @@ class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
 
 
 def calibrate(request: Calibrate, *, as_json: bool) -> None:
-    """Find shift profiles with a small peak jerk over the spread of made units.
+    """Find shift profiles with a small peak jerk over production scatter.
 
     Minimise the tail mean of peak jerk under limits, and certify the result on fresh draws. Write
     calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx into DIR;

@@ -155,10 +155,10 @@ def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[
         blocks.append(make_table("Shared values, at the fields' means.", columns, rows))
     blocks += make_notes("Of all parameters", shared)
     names = ", ".join(map(get_parameter_label, missing))
-    blocks += make_notes("Too few logs with a value of their own", [names] if names else [])
+    blocks += make_notes("Not estimated: from the card in most logs", [names] if names else [])
     return Section(
         "parameters",
-        "What the logs say together",
+        "Fleet values",
         "Each log counts by what it states of its own error; units may differ, and age. Sensor "
         "errors that a unit keeps are part of the spread: logs alone do not separate them.",
         blocks,
@@ -352,7 +352,7 @@ def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder:
         "Logs that do not fit are left out of the shared values above; a unit that changed counts "
         "as another one from there on."
     )
-    return Section("odd", "What is odd", intro, blocks)
+    return Section("odd", "Outliers", intro, blocks)
 
 
 def _format_values(one: JointEstimate, outlier: Outlier) -> tuple[str, str]:

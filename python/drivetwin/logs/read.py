@@ -307,7 +307,7 @@ def _refuse_unitless(
     names = list(refused.values())
     raise UnitError(
         f"the file names no unit for {', '.join(map(repr, names))}",
-        "assert the units in a channel mapping (--channels; 'drivetwin inspect --write-mapping' "
+        "state the units in a channel mapping (--channels; 'drivetwin inspect --write-mapping' "
         f"begins one), if they are these: {examples}",
         Where(file=file, channel=names[0] if len(names) == 1 else None),
     )

@@ -181,9 +181,10 @@ def _describe_confidence(found: Calibration) -> str:
     one = found.after.certificate
     return (
         f"Upper bounds by order statistics of {one.draws} draws hold with "
-        f"{100.0 * one.confidence:.0f} % confidence; so does: {100.0 * one.worst_share:.2f} % of "
-        "all units stay below the worst value drawn. Only the stated spread and the identified "
-        "covariance are drawn: wear is not. The promised value is kept by "
+        f"{100.0 * one.confidence:.0f} % confidence. With the same confidence, "
+        f"{100.0 * one.worst_share:.2f} % of all units stay below the worst value drawn. "
+        "Only the stated spread and the identified covariance are drawn: wear is not. "
+        "The promised value is kept by "
         f"95 % of the units of {_describe_types(found)} vehicle types that the log leaves possible."
     )
 
@@ -238,8 +239,8 @@ def _build_shares(found: Calibration) -> TableBlock:
         for name, one in sorted(group.items(), key=lambda item: -item[1])
     ]
     return make_table(
-        "Variance of peak jerk that goes with an uncertainty: the log's range of vehicle types "
-        "against the spread of made units, then each element alone",
+        "Variance of peak jerk by its source: uncertainty of identified values and production "
+        "scatter, then each element alone",
         ("uncertainty", ("share [%]", ".0f")),
         rows,
     )

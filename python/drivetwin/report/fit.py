@@ -101,7 +101,7 @@ def build_fit_blocks(
 
 def _build_verdict(found: ModelFit) -> VerdictBlock:
     size = format_significant(found.chi2, 3)
-    reason = f"The residuals are {size} times the noise, in squares per sample."
+    reason = f"The mean squared residual is {size} of the noise."
     return build_verdict_block(ModelVerdict(found.status, reason, _ACTIONS[found.status]))
 
 
@@ -167,12 +167,14 @@ def _build_agreement_table(
 ) -> TableBlock:
     agreement = dict(zip(logs, found.agreement, strict=True))
     agreement |= {f"{name}, held out": one.agreement for name, one in held_out.items()}
+    outputs = found.problem.terms[0].plant.outputs
+    displays = {name: _get_display(get_output_quantity(one)) for name, one in outputs.items()}
     rows = [
-        (log, name, one.fit_percent, one.rmse)
+        (log, name, one.fit_percent, one.rmse * displays[name].factor, displays[name].label)
         for log, fits in agreement.items()
         for name, one in fits.items()
     ]
-    columns = ("log", "output", ("fit %", ".1f"), ("rmse, SI", "3"))
+    columns = ("log", "output", ("fit %", ".1f"), ("rmse", "3"), "unit")
     return make_table("Agreement of simulation and measurement", columns, rows)
 
 
@@ -186,7 +188,7 @@ def _build_start_table(found: ModelFit) -> TableBlock:
         ]
         rows.append((str(number), start.cost - best, start.iterations, ", ".join(texts)))
     values = "first value" if len(found.sought) == 1 else "first values"
-    columns = ("start", ("Q above the best", ".2f"), ("iterations", "d"))
+    columns = ("start", ("cost above best", ".2f"), ("iterations", "d"))
     return make_table(
         f"{found.agreeing} of {len(found.starts)} starts led to the best minimum",
         (*columns, Cell(values, secondary=True)),

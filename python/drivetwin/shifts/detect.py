@@ -153,8 +153,8 @@ def _explain_no_shift(search: Search, runs: list[Run], index: int) -> str:
     if before is None:
         return f"no gear is held before gear {after.gear if after else ''}; {measured}"
     return (
-        f"slip reaches zero in no gear after gear {before.gear}: the on-coming element "
-        f"does not lock before the recording or the motion ends; {measured}"
+        f"the on-coming element does not lock: after gear {before.gear} the slip is zero in no "
+        f"gear until the recording or the motion ends; {measured}"
     )
 
 

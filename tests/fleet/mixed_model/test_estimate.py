@@ -123,7 +123,8 @@ def test_a_stray_log_is_named_with_the_reason(found: dict[str, Any]) -> None:
     (outlier,) = found["mu.B3"].outliers
     assert outlier.log == STRAY
     assert outlier.score > 8.0
-    for words in ("above what unit", "fits its output torque to 60.0 %", "the sensor sticks"):
+    assert "above the value expected for unit T3" in outlier.reason
+    for words in ("fits its output torque to 60.0 %", "the sensor sticks"):
         assert words in outlier.reason
     assert not found["eta"].outliers
 

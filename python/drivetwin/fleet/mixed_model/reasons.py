@@ -33,8 +33,8 @@ def attach_reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEs
     def add_reason(one: JointEstimate, outlier: Outlier) -> Outlier:
         others = [name for name in also[outlier.log] if name != one.parameter]
         parts = [
-            f"{abs(outlier.score):.1f} standard deviations {_describe_side(outlier)} what unit "
-            f"{outlier.unit} lets expect"
+            f"{abs(outlier.score):.1f} standard deviations {_describe_side(outlier)} the value "
+            f"expected for unit {outlier.unit}"
         ]
         if others:
             parts.append(f"so are its {', '.join(others)}")

@@ -104,7 +104,7 @@ def build_suggestion_blocks(
         ("now", "s", "± 95 %"),
         "experiment that would narrow it",
         ("then", "s", "± 95 %, to expect"),
-        "number that would narrow it if exact on the card",
+        "best number to measure",
         ("then", "s", "± 95 %, to expect"),
     )
     table = make_table(

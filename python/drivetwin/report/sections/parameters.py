@@ -97,17 +97,18 @@ def build_parameter_table(
     estimates: Mapping[str, Estimate], caption: str | None = None
 ) -> TableBlock:
     """All parameters with their intervals and verdicts; the caption counts the latter if None."""
+    is_noise_alone = not any(one.std_systematic for one in estimates.values())
     columns = (
         "parameter",
         ("value", "s"),
-        ("± 95 %", "s", "sensors and effects"),
+        ("± 95 %", "s", "" if is_noise_alone else "sensors and effects"),
         make_number("± 95 %", "noise alone", secondary=True),
         "unit",
         "verdict",
         Cell("method", secondary=True),
     )
     counted = _count_parameters(estimates)
-    if not any(one.std_systematic for one in estimates.values()):
+    if is_noise_alone:
         counted += (
             " The vehicle card states no sensor tolerance, so both intervals are of noise alone."
         )
