@@ -82,8 +82,8 @@ ENTRIES = (
     Entry(
         "calibration",
         "A calibrated shift",
-        "Pressures and engine torque of a shift that stays comfortable over the spread of made "
-        "units, with its certificate.",
+        "Pressures and engine torque of a shift that stays comfortable over production "
+        "scatter, with its certificate.",
         (*_SHIFT, "drivetwin calibrate shift/twin.toml --shift 2-3 -o calibration"),
         "calibration/report.html",
     ),
