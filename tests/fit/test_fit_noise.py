@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Fits of recordings whose sensors round."""
+"""Fits of recordings whose sensors round, or send means."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from drivetwin.fit.recording import Measured, Recording
+from drivetwin.fit.recording import Measured, Recording, Samples
+from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.model import Model
 from drivetwin.simulation.dual_clutch import Signal
@@ -47,3 +48,26 @@ def test_a_rounded_sensor_is_as_far_off_at_a_level_as_in_one_sample(
     for name, value in TRUTH.items():
         assert abs(found.values[name] - value) < 3.0 * found.std[name], name
         assert found.std[name] < 0.06 * value, name
+
+
+def test_samples_that_are_means_are_compared_with_means() -> None:
+    """The speed comes every 20 ms, as the mean since the sample before."""
+    fine = np.linspace(0.0, 8.0, 8001)
+    torque = Signal(fine, 40.0 + 30.0 * np.tanh(5.0 * np.sin(2.0 * np.pi * fine)))
+    exact = build_stand(torque).simulate(fine)["speed", "a"]
+    steps = 0.5 * (exact[1:] + exact[:-1])
+    means = np.append(exact[:1], steps.reshape(-1, 20).mean(axis=1))
+    speed = means + 0.01 * np.random.default_rng(4).standard_normal(means.size)
+    unknowns = {name: Unknown(1.3 * value) for name, value in TRUTH.items()}
+
+    def fit(samples: Samples) -> ModelFit:
+        measured = Measured(fine[::20], speed, 0.01, samples)
+        recording = Recording({"motor": torque}, {"w": measured})
+        return build_stand(torque).fit(recording, unknowns, {"w": ("speed", "a")}, seed=0)
+
+    found = fit(Samples.MEAN)
+    assert found.chi2 == pytest.approx(1.0, abs=0.15)
+    for name, value in TRUTH.items():
+        assert abs(found.values[name] - value) < 3.0 * found.std[name], name
+        assert found.std[name] < 0.002 * value, name
+    assert fit(Samples.INSTANT).chi2 > 10.0

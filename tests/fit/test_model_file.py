@@ -25,6 +25,7 @@ from drivetwin.fit.model_file import (
     read_model,
 )
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.recording import Samples
 from drivetwin.fit.synthesize import ModelName, read_builtin
 from drivetwin.fit.unknown import Unknown, get_factors
 from drivetwin.modeling.model import Model
@@ -144,6 +145,7 @@ def models(draw: st.DrawFn) -> tuple[NetworkModel, ModelChannels]:
         inputs,
         {name: draw(specs) for name in outputs},
         {name: draw(positive) for name in outputs if draw(st.booleans())},
+        {name: draw(st.sampled_from(Samples)) for name in outputs},
         known,
         draw(st.none() | st.just(run)),
     )

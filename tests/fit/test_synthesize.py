@@ -15,7 +15,7 @@ from drivetwin.errors import InputError
 from drivetwin.fit.model_file import ModelChannels, RunTable, read_model
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.read import read_recording
-from drivetwin.fit.recording import Recording
+from drivetwin.fit.recording import Recording, Samples
 from drivetwin.fit.synthesize import ModelName, find_model, read_builtin, synthesize_log
 from drivetwin.simulation.network_sensitivity import get_number
 
@@ -43,6 +43,21 @@ def test_the_model_file_has_the_guesses_and_the_truth_file_the_elements(
         assert get_number(model.elements, path) == truth[path]
         assert get_number(guessed.elements, path) == unknown.value
         assert unknown.value != truth[path]
+
+
+def test_a_channel_of_means_is_written_and_read_as_such(tmp_path: Path) -> None:
+    model, channels = read_builtin(ModelName.TIP_IN)
+    assert channels.run is not None
+    channels = replace(channels, sigma={}, run=channels.run.model_copy(update={"rate_Hz": 500.0}))
+    samples = {**channels.samples, "motor speed": Samples.MEAN}
+    instants, means = (
+        read(tmp_path, model, one).outputs["motor speed"]
+        for one in (channels, replace(channels, samples=samples))
+    )
+    assert means.samples is Samples.MEAN
+    middle = 0.5 * (instants.values[1:] + instants.values[:-1])
+    largest = float(np.max(np.abs(np.diff(instants.values))))
+    assert np.max(np.abs(means.values[1:] - middle)) < 0.1 * largest
 
 
 def test_equal_seeds_give_equal_logs_and_noise_has_the_stated_size() -> None:

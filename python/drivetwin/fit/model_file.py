@@ -30,6 +30,7 @@ from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance, list_fixed
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
+from drivetwin.fit.recording import Samples
 from drivetwin.fit.unknown import Unknown, get_factors
 from drivetwin.simulation.element_schema import (
     ELEMENT_FIELDS,
@@ -121,11 +122,13 @@ class OutputEntry(ChannelEntry):
     """`[outputs.NAME]`: a column of the log, and the quantity of the model that it measures.
 
     `quantity` is a kind and a name, such as `["speed", "engine"]`; `sigma` the noise of a sample in
-    SI, estimated from the log where it is left out.
+    SI, estimated from the log where it is left out; `samples` are values at instants, or means over
+    the sampling time before them.
     """
 
     quantity: Annotated[list[str], Field(min_length=2, max_length=2)]
     sigma: Positive | None = None
+    samples: Annotated[Samples, Field(strict=False)] = Samples.INSTANT
 
 
 class StartTable(StrictModel):
@@ -203,7 +206,8 @@ class NetworkFile(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class ModelChannels:
-    """Columns of the logs by the names of inputs and outputs, noise by output, known starts.
+    """Columns of the logs by the names of inputs and outputs, noise and meaning of the samples by
+    output, known starts.
 
     `roles` are those of columns that are recognised by name; the source of their spec is the role.
     """
@@ -211,6 +215,7 @@ class ModelChannels:
     inputs: Mapping[str, ChannelSpec]
     outputs: Mapping[str, ChannelSpec]
     sigma: Mapping[str, float]
+    samples: Mapping[str, Samples]
     known: Mapping[str, float]
     run: RunTable | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
@@ -260,6 +265,7 @@ def read_model(path: Path | str) -> tuple[NetworkModel, ModelChannels]:
         },
         {name: one.to_spec(name) for name, one in file.outputs.items()},
         {name: one.sigma for name, one in file.outputs.items() if one.sigma is not None},
+        {name: one.samples for name, one in file.outputs.items()},
         _collect_known(start, str(path)),
         file.run,
         {
@@ -366,6 +372,8 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
             lines += _format_spec(channels.outputs[name], roles.get(name))
             if name in channels.sigma:
                 lines.append(format_entry("sigma", channels.sigma[name]))
+            if channels.samples[name] is not Samples.INSTANT:
+                lines.append(format_entry("samples", str(channels.samples[name])))
     start = model.start
     lines += ["", "[start]", format_entry("speeds", dict(start.speeds))]
     lines.append(format_entry("twists", dict(start.twists)))

@@ -48,8 +48,11 @@ class Channel:
         show: earlier by the delay."""
         if self.delay == 0.0:
             return out
-        place = np.searchsorted(time, time[out.place] - self.delay)
-        return replace(out, place=np.minimum(place, time.size - 1))
+        place, centre = (
+            np.minimum(np.searchsorted(time, time[one] - self.delay), time.size - 1)
+            for one in (out.place, out.centre)
+        )
+        return replace(out, place=place, centre=centre)
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,9 @@ def read_recording(
     signals = {name: prepare_signal(channel) for name, channel in found.items()}
     inputs = {name: Signal(signals[name].time, signals[name].values) for name in channels.inputs}
     outputs = {
-        name: Measured(one.time, one.values, channels.sigma.get(name, one.sigma))
+        name: Measured(
+            one.time, one.values, channels.sigma.get(name, one.sigma), channels.samples[name]
+        )
         for name in channels.outputs
         for one in [signals[name]]
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import partial
 from typing import Any, Self
 
@@ -34,21 +35,41 @@ _MIN_SAMPLES = 20
 """Fewest samples of a compared quantity."""
 
 
+class Samples(StrEnum):
+    """Meaning of the samples of a channel."""
+
+    INSTANT = "instant"
+    """Value at the stamp."""
+    MEAN = "mean"
+    """Mean over the sampling time that ends at the stamp, as encoders on a bus send it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Measured quantity: `values` (n,) at `time` (n,) [s], SI.
 
     `sigma` is the standard deviation of the white noise of a sample; estimated from the record
-    where it is None.
+    where it is None. The first of `samples` that are means covers time before the recording, and is
+    not compared.
     """
 
     time: FloatArray
     values: FloatArray
     sigma: float | None = None
+    samples: Samples = Samples.INSTANT
 
     def __post_init__(self) -> None:
         for name in ("time", "values"):  # lists and series are taken as well
             object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
+
+    def to_output(self, name: str, time: FloatArray) -> Output:
+        """Build the compared output over the grid `time` (N,) [s] that contains its stamps."""
+        place = np.searchsorted(time, self.time)
+        rounding = self.find_rounding()
+        found = Output(name, place, self.values, self.get_noise(), rounding=rounding)
+        if self.samples is Samples.INSTANT:
+            return found
+        return found.drop_first_period(time).convert_to_means(time)
 
     def get_noise(self) -> float:
         """Return the noise of a sample, at least that of an ideal sensor."""
@@ -166,21 +187,23 @@ class NetworkRecord(ComparedOutputs):
         """Sample quantities (N,) or (N, p) on the grid, by name; (size,) or (size, p)."""
         return np.concatenate([out.sample(self.time, columns[out.name]) for out in self.outputs])
 
-    def coarsen(self, points: int) -> NetworkRecord:
-        """Keep about so many `points` of the grid: every k-th sample of each output, and means of
+    def coarsen(self, count: int) -> NetworkRecord:
+        """Keep about `count` points of the grid: every k-th sample of each output, and means of
         the inputs over as many of theirs."""
-        every = max(self.time.size // points, 1)
+        every = max(self.time.size // count, 1)
         if every == 1:
             return self
-        stamps = [self.time[out.place[::every]] for out in self.outputs]
-        time = np.unique(np.concatenate([self.time[:1], *stamps, self.time[-1:]]))
+        kept = [out.select(slice(None, None, every)) for out in self.outputs]
+        shown = [one for out in kept for one in (out.find_begin(self.time), out.centre, out.place)]
+        points = np.unique(np.concatenate([[0], *shown, [self.time.size - 1]]))
+        time = self.time[points]
         outputs = tuple(
             replace(
-                out.select(slice(None, None, every)),
-                place=(place := np.searchsorted(time, own)),
-                centre=place,
+                out,
+                place=np.searchsorted(points, out.place),
+                centre=np.searchsorted(points, out.centre),
             )
-            for out, own in zip(self.outputs, stamps, strict=True)
+            for out in kept
         )
         inputs, variance, held_back = {}, {}, {}
         for name, signal in self.inputs.items():
@@ -283,16 +306,7 @@ def build_network_record(
         compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
     between = [float(np.median(np.diff(one.time))) for one in inputs.values()]
     time = fill_grid(stamps, max(min(between, default=RECORD.grid_step), RECORD.grid_step))
-    samples = tuple(
-        Output(
-            name,
-            np.searchsorted(time, one.time),
-            one.values,
-            one.get_noise(),
-            rounding=one.find_rounding(),
-        )
-        for name, one in compared.items()
-    )
+    samples = tuple(one.to_output(name, time) for name, one in compared.items())
     read = {name: Measured(one.time, one.values) for name, one in inputs.items()}
     windows = {
         name: select_windows(MeasuredSignal(one.time, one.values, one.get_noise()))

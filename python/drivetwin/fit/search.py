@@ -312,7 +312,7 @@ def _compute_scores(term: NetworkTerm, start: ParameterVector, draws: FloatArray
     measured = np.full((len(task.outputs), term.record.time.size), np.nan)
     for row, out in zip(measured, term.record.outputs, strict=True):
         own = channels[out.name]
-        row[out.place] = (out.values - own.offset) / own.gain
+        row[out.centre] = (out.values - own.offset) / own.gain
     scenario = NetworkScenario(task.inputs, task.start)
     sets = term.plant.compute_sets(draws)
     found = simulate_network_batch(

@@ -133,7 +133,7 @@ def _read_first_values(outputs: Mapping[str, Output], record: NetworkRecord) -> 
     """Read the value of each compared quantity at the start of the grid."""
     found = {}
     for out in record.outputs:
-        time = record.time[out.place][:_GUESS_SAMPLES] - record.time[0]
+        time = record.time[out.centre][:_GUESS_SAMPLES] - record.time[0]
         line = np.polynomial.polynomial.polyfit(time, out.values[:_GUESS_SAMPLES], 1)
         found[outputs[out.name]] = float(line[0])
     return found

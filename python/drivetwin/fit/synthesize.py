@@ -23,9 +23,13 @@ from drivetwin.fit.model_file import ModelChannels, format_model, read_model
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.plant import Plant
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
+from drivetwin.fit.recording import Samples
 from drivetwin.fit.unknown import get_factors
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import simulate
+
+_FINE = 10
+"""Steps of the simulation in a sampling time over which a mean is taken [count]."""
 
 
 class ModelName(StrEnum):
@@ -91,6 +95,13 @@ def synthesize_log(
         at, values = np.array(one.points).T
         driven[name] = Signal(time, np.interp(time, at, values))
     columns = _simulate(model, driven, time)
+    means = [name for name, one in channels.samples.items() if one is Samples.MEAN]
+    if means:
+        fine = np.linspace(0.0, manoeuvre.end_s, (count - 1) * _FINE + 1)
+        found = _simulate(model, driven, fine)
+        for name in means:
+            middle = 0.5 * (found[name][1:] + found[name][:-1])
+            columns[name][1:] = middle.reshape(-1, _FINE).mean(axis=1)
     rng = np.random.default_rng(seed)
     for name, one in manoeuvre.inputs.items():
         values = driven[name].values

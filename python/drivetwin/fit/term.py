@@ -185,7 +185,9 @@ class NetworkTerm:
             for name, row in rows.items()
         }
         seen = [
-            SeenOutput(rows[out.name], out.centre, _add_direct_noise(out, direct[out.name], power))
+            SeenOutput(
+                rows[out.name], out.centre, _add_direct_noise(out, direct[out.name], power, step)
+            )
             for out in (shown[one.name].find_shown(one, record.time) for one in record.outputs)
         ]
         quiet = self.quiet
@@ -224,13 +226,17 @@ Problem = LikelihoodObjective[NetworkTerm]
 
 
 def _add_direct_noise(
-    out: ComparedOutput, direct: Mapping[str, FloatArray], power: Mapping[str, FloatArray]
+    out: ComparedOutput,
+    direct: Mapping[str, FloatArray],
+    power: Mapping[str, FloatArray],
+    step: FloatArray,
 ) -> FloatArray:
     """Compute the noise (n,) of the samples of an output: of its sensor, and of the inputs of which
-    it is a function without delay."""
+    it is a function without delay. A mean has less of it by the number of steps in its window."""
     variance = out.noise**2
     for name, slope in direct.items():
-        of_input = np.append(power[name], power[name][-1:])
+        of_input = power[name] * step / np.maximum(step, out.window)
+        of_input = np.append(of_input, of_input[-1:])
         variance += (slope**2 * of_input)[out.centre]
     return np.asarray(np.sqrt(variance))
 

@@ -74,6 +74,12 @@ class Output:
         centre = np.searchsorted(time, time[self.place] - 0.5 * window)
         return replace(self, window=window, centre=centre)
 
+    def find_begin(self, time: FloatArray) -> IndexArray:
+        """Find the points (n,) of the grid at which the time of each sample begins."""
+        begin = time[self.place] - self.window
+        after = np.clip(np.searchsorted(time, begin), 1, time.size - 1)
+        return np.asarray(after - (begin - time[after - 1] < time[after] - begin))
+
     def sample(self, time: FloatArray, column: FloatArray) -> FloatArray:
         """Sample a quantity (N,) on the grid `time` (N,) as this sensor does; shape (n,).
 
