@@ -104,7 +104,7 @@ def test_examine_lists_improvements_and_a_profile_of_a_fit(
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("K0.friction.mu_c", "K0.friction.mu_x"), "K0.friction.mu_x: no number 'mu_x'"),
+        (("K0.friction.mu_c", "K0.friction.mu_x"), "K0.friction.mu_x: no number of the model"),
         (('source = "EngSpd"', 'source = "EngSpeed"'), "the log has no column 'EngSpeed'"),
         (("[start]", "[sart]"), "sart"),
         (('"motor"]', '"rotor"]'), "rotor"),

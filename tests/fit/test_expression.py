@@ -180,7 +180,7 @@ def test_a_prior_on_a_function_is_a_row() -> None:
     ("expressions", "said"),
     [
         ({"left.stiffness": Expression("scael")}, "'scael': no unknown; did you mean 'scale'"),
-        ({"left.stiffnes": Expression("scale")}, "left.stiffnes: no number 'stiffnes'"),
+        ({"left.stiffnes": Expression("scale")}, "did you mean 'left.stiffness'"),
         ({"scale": Expression("ratio")}, "scale: an unknown and an expression"),
         ({"a": Expression("scale", paths=["left.damping"]), "left.damping": Expression("ratio")},
          "left.damping: set by 'a' and 'left.damping'"),
@@ -189,7 +189,7 @@ def test_a_prior_on_a_function_is_a_row() -> None:
         ({"left.stiffness": Expression("scale", std=1.0)}, "a prior has value and std"),
         ({"left.stiffness": Expression(math.exp, ("ratio",))}, "the derivative by 'ratio' is 0"),
         ({"left.stiffness": Expression(lambda x: x, ("rato",))}, "did you mean 'ratio'"),
-        ({"both": Expression("ratio", paths=[])}, "scale: no number 'scale'"),
+        ({"both": Expression("ratio", paths=[])}, "scale: no number of the model"),
     ],
 )  # fmt: skip
 def test_impossible_functions_are_refused(expressions: Mapping[str, Expression], said: str) -> None:

@@ -315,11 +315,11 @@ def loosen(element: str, **ends: str) -> tuple[NetworkModel, list[Recording]]:
     [
         (
             change(unknowns={"lft.stiffness": STIFFNESS}),
-            "lft.stiffness: no number 'lft'; did you mean 'left'",
+            "lft.stiffness: no number of the model; did you mean 'left'",
         ),
-        (change(unknowns={"left.mu_x": STIFFNESS}), "left.mu_x: no number 'mu_x'"),
-        (change(unknowns={"start.moter": STIFFNESS}), "start.moter: .* did you mean 'motor'"),
-        (change(unknowns={"delay.engine": STIFFNESS}), "delay.engine: no number 'engine'"),
+        (change(unknowns={"left.mu_x": STIFFNESS}), "left.mu_x: no number of the model"),
+        (change(unknowns={"start.moter": STIFFNESS}), "start.moter: .* did you mean 'start.motor'"),
+        (change(unknowns={"delay.engine": STIFFNESS}), "delay.engine: no number of the model"),
         (change(outputs={"motor": ("speed", "rotor")}), "rotor"),
         (change(outputs={"motor": ("sped", "motor")}), "did you mean 'speed'"),
         (change(outputs={"right": ("speed", "motor")}), "the recording has no right"),

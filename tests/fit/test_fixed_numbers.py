@@ -213,6 +213,7 @@ def read(folder: Path, change: tuple[str, str]) -> list[FixedNumber]:
         ("1.0", "", None),
         ("2.1", '[tolerances."pair.ratio"]\nstd = 0.02', 0.02),
         ("2.1", '[tolerances."pair"]\nexact = true', None),
+        ("1.0", '[tolerances."pair.ratio"]\nstd = 0.02', 0.02),
     ],
 )
 def test_the_written_digits_or_a_tolerance_state_the_deviation_of_a_ratio(

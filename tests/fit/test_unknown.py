@@ -63,16 +63,20 @@ def test_bounds_narrow_the_limits_and_a_factor_scales_those_of_its_field() -> No
 @pytest.mark.parametrize(
     ("name", "said", "remedy"),
     [
-        ("K1.gain", "no number 'K1'; known here", "engine, converter, K0, load"),
-        ("K0.friction.mu_x", "K0.friction.mu_x: no number 'mu_x'", "mu_c, mu_s, v_s, mu_v"),
-        ("K0.friction", "K0.friction is no number", "mu_c, mu_s, v_s, mu_v"),
-        ("K0.gain.x", "K0.gain.x: no number 'gain.x'", ""),
-        ("K0.pressure", "K0.pressure: no number 'pressure'", "gain, p0"),
-        ("converter.map.capacity", "is no number", ""),
-        ("converter.map.capacity.9", "no number '9'", "0, 1, 2"),
-        ("converter.map.capacity.9.2", "no number '9'", "0, 1, 2"),
-        ("converter.map.capacity.x", "no number 'x'", ""),
-        ("", "is no number", "engine, converter, K0, load"),
+        (
+            "K1.gain",
+            "K1.gain: no number of the model; known here",
+            "engine, converter, K0, load",
+        ),
+        ("K0.friction.mu_x", "did you mean 'K0.friction.mu_", "K0.friction.mu_c, K0.friction.mu_s"),
+        ("K0.friction", "did you mean 'K0.friction.", "K0.friction.v_s"),
+        ("K0.gain.x", "K0.gain.x: no number of the model; did you mean 'K0.gain'", ""),
+        ("K0.pressure", "K0.pressure: no number of the model", "K0.gain, K0.p0"),
+        ("converter.map.capacity", "name one of the list, such as converter.map.capacity.0", ""),
+        ("converter.map.capacity.9", "no number of the model", "converter.map.capacity"),
+        ("converter.map.capacity.9.2", "no number of the model", ""),
+        ("converter.map.capacity.x", "no number of the model", ""),
+        ("", "no number of the model", "engine, converter, K0, load"),
     ],
 )
 def test_a_path_that_leads_to_no_number_is_named_with_the_known_ones(
@@ -131,11 +135,11 @@ def test_numbers_beside_the_elements_have_units(name: str, unit: str, positive: 
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("start.engin", "start.engin: .* did you mean 'engine'"),
-        ("delay.q", "delay.q: no number 'q'"),
-        ("gain.T", "gain.T: no number 'T'"),
-        ("input.p", "input.p: no number 'p'"),
-        ("offset", "offset is no number"),
+        ("start.engin", "start.engin: .* did you mean 'start.engine'"),
+        ("delay.q", "delay.q: no number of the model; did you mean 'delay.p'"),
+        ("gain.T", "gain.T: no number of the model"),
+        ("input.p", "input.p: no number of the model"),
+        ("offset", "offset: no number of the model"),
     ],
 )
 def test_numbers_beside_the_elements_need_a_name_of_the_network(name: str, said: str) -> None:

@@ -179,16 +179,13 @@ _STEP, _AGREEMENT = 1e-6, 1e-3
 def _require_derivatives(found: DerivedNumber, point: ParameterVector, slopes: FloatArray) -> None:
     """Raise InputError for a function that loses the derivatives of its arguments, as one of the
     module `math`."""
-    for place, name in enumerate(point.names):
-        step = _STEP * max(abs(float(point.values[place])), 1.0)
-        ends = [
-            found.evaluate(point.replace_values(point.values + side * np.eye(slopes.size)[place]))
-            for side in (-step, step)
-        ]
-        slope = (ends[1] - ends[0]) / (2.0 * step)
-        size = max(abs(slope), abs(slopes[place]), _AGREEMENT * abs(found.evaluate(point)))
-        if abs(slope - slopes[place]) > _AGREEMENT * size:
-            what = f"{found.name}: the derivative by {name!r} is {slopes[place]:g}, not {slope:g}"
+    steps = np.diag(_STEP * np.maximum(np.abs(point.values), 1.0))
+    for name, step, slope in zip(point.names, steps, slopes.tolist(), strict=True):
+        ends = [found.evaluate(point.replace_values(point.values + s)) for s in (step, -step)]
+        there = (ends[0] - ends[1]) / (2.0 * step.sum())
+        size = max(abs(slope), abs(there), _AGREEMENT * abs(ends[0]))
+        if abs(slope - there) > _AGREEMENT * size:
+            what = f"{found.name}: the derivative by {name!r} is {slope:g}, not {there:g}"
             raise InputError(what, "take exp and log from drivetwin.simulation.variable")
 
 

@@ -8,7 +8,6 @@ direct gear, no loss, a capacity that is an input.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import StrEnum
@@ -110,14 +109,15 @@ def list_fixed(
         usual, number = one.usual, one.value
         groups = _iterate_groups(path)
         stated = next((tolerances[each] for each in groups if each in tolerances), None)
-        is_absent = number == 0.0 and one.keys[0] == "elements"
-        if path in unknown or is_absent or (usual.unit and number == 1.0) or one.field == "start":
+        is_exact = number == 0.0 or (usual.unit and number == 1.0)
+        if path in unknown or one.field == "start" or (is_exact and path not in tolerances):
             continue
         if stated is None and usual.shared:
             levels.setdefault((one.keys[:2], usual.shared), []).append(one)
         std, source = _find_deviation(number, usual, stated)
         if std > 0.0:
-            is_relative = not (usual.absolute or usual.digits or usual == UsualDeviation())
+            is_absolute = usual.absolute or usual.digits or usual == UsualDeviation()
+            is_relative = not is_absolute and number != 0.0
             unit = one.schema.unit.translate(ASCII_UNITS)
             found.append(
                 FixedNumber(path, float(number), std, unit, is_relative, (one.keys,), source)
@@ -127,13 +127,8 @@ def list_fixed(
         name = f"factor of {elements[int(index)]['name']}.{shared}"
         keys, level = tuple(one.keys for one in inside), inside[0].usual.level
         found.append(FixedNumber(name, 1.0, level, "", True, keys, Source.USUAL))
-    return sorted(found, key=_get_order)
-
-
-def _get_order(one: FixedNumber) -> int:
-    """Return the place of a fixed number in the list: elements in their order, channels last."""
-    table, index, *_ = one.places[0]
-    return int(index) if table == "elements" else sys.maxsize
+    order = {one.keys[:2]: place for place, one in enumerate(places.values())}
+    return sorted(found, key=lambda one: order[one.places[0][:2]])
 
 
 def _iterate_groups(path: str) -> Iterator[str]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import operator
 from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple, cast
@@ -33,8 +34,6 @@ _FUNCTIONS: Mapping[str, Callable[[float], float]] = {
 }
 _REMEDY = "write numbers, names, + - * / **, exp, log and sqrt; other names in quotes"
 
-_Evaluate = Callable[[Mapping[str, float]], float]
-
 
 class Formula(NamedTuple):
     """Function of the numbers with the names `of`, in their order."""
@@ -61,54 +60,48 @@ def parse_formula(name: str, text: str, known: Collection[str]) -> Formula:
         With the column of what is no formula, or of a name that is not known.
     """
     used: dict[str, None] = {}
+
+    def note(node: ast.expr) -> float:
+        spelled = _spell(node)
+        if spelled not in known:
+            hint = f"{spelled!r}: no unknown{suggest_spelling(spelled, known)}" if spelled else ""
+            raise SyntaxError(f"column {node.col_offset + 1} {hint or 'is not allowed'}")
+        used[spelled] = None
+        return math.nan  # no arithmetic on it fails
+
     try:
-        evaluate = _compile(ast.parse(text.strip(), mode="eval").body, known, used)
-    except _FormulaError as error:
-        raise InputError(f"{name}: {text!r}, {error}", _REMEDY) from None
-    except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
+        tree = ast.parse(text.strip(), mode="eval").body
+        _evaluate(tree, note)
+    except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
         what = f"{name}: {text!r} is no formula: {getattr(error, 'msg', error)}"
         raise InputError(what, _REMEDY) from None
-    of = tuple(used)
-    return Formula(of, lambda *values: evaluate(dict(zip(of, values, strict=True))))
+
+    def compute(*values: float) -> float:
+        by_name = dict(zip(used, values, strict=True))
+        return _evaluate(tree, lambda node: by_name[_spell(node)])
+
+    return Formula(tuple(used), compute)
 
 
-class _FormulaError(Exception):
-    """Part of a formula that is not allowed, with its column."""
-
-
-def _compile(node: ast.expr, known: Collection[str], used: dict[str, None]) -> _Evaluate:
-    """Return the function of a node of a formula; the names in it are added to those `used`."""
+def _evaluate(node: ast.expr, read: Callable[[ast.expr], float]) -> float:
+    """Compute a formula; `read` returns the number of a node that is no operation."""
     match node:
         case ast.BinOp(left=left, op=sign, right=right) if type(sign) in _OPERATORS:
-            first, second = (_compile(one, known, used) for one in (left, right))
-            combine = _OPERATORS[type(sign)]
-            return lambda values: combine(first(values), second(values))
+            return _OPERATORS[type(sign)](_evaluate(left, read), _evaluate(right, read))
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            inner = _compile(operand, known, used)
-            return lambda values: -inner(values)
-        case ast.Call(func=ast.Name(id=called), args=[operand], keywords=[]) if (
-            called in _FUNCTIONS
-        ):
-            inner, function = _compile(operand, known, used), _FUNCTIONS[called]
-            return lambda values: function(inner(values))
+            return -_evaluate(operand, read)
+        case ast.Call(func=ast.Name(id=name), args=[operand], keywords=[]) if name in _FUNCTIONS:
+            return _FUNCTIONS[name](_evaluate(operand, read))
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-            number = float(value)
-            return lambda _: number
-    name = _spell(node)
-    if name is None or name not in known:
-        what = "is not allowed" if name is None else f"{name!r}: no unknown"
-        hint = "" if name is None else suggest_spelling(name, known)
-        raise _FormulaError(f"column {node.col_offset + 1} {what}{hint}")
-    used[name] = None
-    return lambda values: values[name]
+            return float(value)
+    return read(node)
 
 
-def _spell(node: ast.expr) -> str | None:
-    """Return the name that a node spells; None for another node."""
+def _spell(node: ast.expr) -> str:
+    """Return the name that a node spells; empty for another node."""
     match node:
         case ast.Name(id=name) | ast.Constant(value=str() as name):
             return name
         case ast.Attribute(value=inner, attr=last):
-            head = _spell(inner)
-            return head and f"{head}.{last}"
-    return None
+            return f"{_spell(inner)}.{last}"
+    return ""

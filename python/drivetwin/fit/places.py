@@ -105,22 +105,22 @@ def _make_place(head: str, keys: Keys, value: float, unit: str, *, known: bool =
 
 
 def find_place(path: str, places: Mapping[str, Place]) -> Place:
-    """Return the place at a path; raises InputError where there is none, with the known ones."""
+    """Return the place at a path; raises InputError where there is none, with those near it."""
     if path in places:
         return places[path]
-    stem = path
-    while stem and not any(one.startswith(f"{stem}.") for one in places):
-        stem = stem.rpartition(".")[0]
-    head = f"{stem}." if stem else ""
-    inner = (one[len(head) :] for one in places if one.startswith(head))
-    # Names of inputs and nodes may contain points.
-    known = list(dict.fromkeys(one if head[:-1] in BESIDE else one.split(".")[0] for one in inner))
-    if stem == path:
-        raise InputError(f"{path} is no number", f"known are {', '.join(known)}")
-    first, _, rest = (name := path[len(head) :]).partition(".")
-    name = name if stem in BESIDE or (rest and first in known) else first
-    hint = "" if first in known else suggest_spelling(name, known)
-    raise InputError(f"{path}: no number {name!r}{hint}", f"known are {', '.join(known)}")
+    head = path.partition(".")[0]
+    heads = dict.fromkeys(one.partition(".")[0] for one in places)
+    near = {
+        f"{head}.{one.field}" if one.keys[0] == "elements" else one.path: None
+        for one in places.values()
+        if one.path.startswith(f"{head}.")
+    }
+    hint = suggest_spelling(path if near else head, near or heads)
+    if path in near:
+        hint = f"; name one of the list, such as {path}.0"
+    raise InputError(
+        f"{path}: no number of the model{hint}", f"known are {', '.join(near or heads)}"
+    )
 
 
 class Numbers:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -31,7 +32,7 @@ from drivetwin.estimation.result.verdict import (
     compute_correlation,
 )
 from drivetwin.findings import Code, Finding, Number, Severity, report
-from drivetwin.fit.expression import DerivedNumber, ResolvedNumbers
+from drivetwin.fit.expression import ResolvedNumbers
 from drivetwin.fit.fixed_numbers import FixedNumber, Source, Tolerance
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.search import FoundMinimum, RefinedStart
@@ -149,11 +150,12 @@ class MovedNumber:
 class ModelFit(EstimatesMixin):
     """Result of a fit.
 
-    `estimates` by name of the unknown, those of its functions `derived` after them; `intervals` are
-    their 95 % intervals, those of a positive number by its logarithm. `starts` are the minima that
-    the refined starts led to, `agreeing` the number of those in the best one. `agreement` compares
-    the simulation with each recording, by output. `moved` are the numbers beside the unknowns that
-    are coordinates of the minimum.
+    `estimates`, `values`, standard deviations `std` [SI] and 95 % `intervals` by name of the
+    unknown, and after these of the functions of unknowns; `values` and `std` whatever the verdicts.
+    Intervals of a positive number are by its logarithm. `starts` are the minima that the refined
+    starts led to, `agreeing` the number of those in the best one. `agreement` compares the
+    simulation with each recording, by output. `moved` are the numbers beside the unknowns that are
+    coordinates of the minimum.
     """
 
     model: NetworkModel
@@ -161,6 +163,8 @@ class ModelFit(EstimatesMixin):
     minimum: OptimizeResult[Problem]
     covariance: FloatArray
     estimates: Mapping[str, Estimate]
+    values: Mapping[str, float]
+    std: Mapping[str, float]
     intervals: Mapping[str, tuple[float, float]]
     starts: tuple[RefinedStart, ...]
     agreeing: int
@@ -168,7 +172,6 @@ class ModelFit(EstimatesMixin):
     findings: tuple[Finding, ...]
     status: ModelStatus
     moved: tuple[MovedNumber, ...] = ()
-    derived: Sequence[DerivedNumber] = ()
 
     @property
     def problem(self) -> Problem:
@@ -189,25 +192,6 @@ class ModelFit(EstimatesMixin):
     def chi2(self) -> float:
         """Q per sample without the priors; 1 where the model explains the recordings."""
         return _compute_chi2(self.minimum)
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Values at the minimum by name of the unknown or function, SI, whatever their verdicts."""
-        return {one.name: value for one, value, _ in self._coordinates}
-
-    @property
-    def std(self) -> dict[str, float]:
-        """Standard deviations of the values by name, SI, whatever their verdicts."""
-        return {
-            one.name: std * (value if one.is_positive else 1.0)
-            for one, value, std in self._coordinates
-        }
-
-    @property
-    def _coordinates(self) -> list[tuple[PlacedNumber, float, float]]:
-        numbers = ResolvedNumbers(list(self.sought), list(self.derived))
-        found = list_coordinates(numbers, self.minimum.point, self.covariance)
-        return [(one, one.to_value(place), std) for one, place, std in found]
 
     @property
     def correlation(self) -> FloatArray:
@@ -294,21 +278,16 @@ class ModelFit(EstimatesMixin):
         }
 
 
-def list_coordinates(
+def _iterate_coordinates(
     numbers: ResolvedNumbers, point: ParameterVector, covariance: FloatArray
-) -> list[tuple[PlacedNumber, float, float]]:
-    """List the unknowns and the functions of them with their coordinates at a point, and the
+) -> Iterator[tuple[PlacedNumber, float, float]]:
+    """Yield the unknowns and the functions of them with their coordinates at a point, and the
     standard deviations of these."""
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
-    found: list[tuple[PlacedNumber, float, float]] = [
-        (one, point[one.name], std) for one, std in zip(numbers.sought, spread, strict=False)
-    ]
+    for k, sought in enumerate(numbers.sought):
+        yield sought, float(point.values[k]), math.sqrt(max(float(covariance[k, k]), 0.0))
     for one in numbers.derived:
         coordinate, slopes = one.linearise(point)
-        found.append(
-            (one, coordinate, float(np.sqrt(np.maximum(slopes @ covariance @ slopes, 0.0))))
-        )
-    return found
+        yield one, coordinate, math.sqrt(max(float(slopes @ covariance @ slopes), 0.0))
 
 
 def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum) -> ModelFit:
@@ -316,11 +295,13 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
     minimum, sought = found.result, numbers.sought
     problem, chi2 = minimum.problem, _compute_chi2(minimum)
     covariance = compute_covariance(problem, minimum.normal, chi2)
-    estimates, intervals = {}, {}
-    for one, coordinate, std in list_coordinates(numbers, minimum.point, covariance):
-        estimates[one.name] = _judge(one, coordinate, std)
+    estimates, values, spreads, intervals = {}, {}, {}, {}
+    for one, coordinate, std in _iterate_coordinates(numbers, minimum.point, covariance):
+        name, value = one.name, one.to_value(coordinate)
+        values[name], spreads[name] = value, value * std if one.is_positive else std
+        estimates[name] = _judge(one, value, spreads[name])
         low, high = (one.to_value(coordinate + side * Z95 * std) for side in (-1.0, 1.0))
-        intervals[one.name] = (low, high)
+        intervals[name] = (low, high)
     agreement = tuple(term.compare(minimum.point) for term in problem.terms)
     failures = tuple(find_failures(problem.terms, minimum.normal.residuals, agreement, chi2))
     doubts = find_doubts(problem.terms, agreement, failures, chi2)
@@ -341,6 +322,8 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
         minimum,
         covariance,
         estimates,
+        values,
+        spreads,
         intervals,
         found.starts,
         found.agreeing,
@@ -348,7 +331,6 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
         findings,
         judge_status(failures, findings, estimates),
         moved,
-        numbers.derived,
     )
 
 
@@ -375,15 +357,14 @@ def _compute_chi2(minimum: OptimizeResult[Problem]) -> float:
     return (minimum.normal.cost - prior) / minimum.problem.size
 
 
-def _judge(one: PlacedNumber, coordinate: float, std: float) -> Estimate:
-    """Return the estimate of a number from its coordinate and its standard deviation."""
-    value = one.to_value(coordinate)
-    numbers = one.name, value, value * std if one.is_positive else std
-    stated, known = one.stated.value, one.stated.std
-    if stated is None or known is None:
+def _judge(one: PlacedNumber, value: float, std: float) -> Estimate:
+    """Return the estimate of a number from its value and its standard deviation."""
+    numbers, stated = (one.name, value, std), one.stated
+    if stated.std is None:
         return assess(*numbers, METHOD, spec=one.spec)
     # The prior of a positive number is relative: its spread at the estimate.
-    prior = PriorValue(stated, known * (value / stated if one.is_positive else 1.0))
+    scale = value / stated.value if one.is_positive else 1.0
+    prior = PriorValue(stated.value, stated.std * scale)
     return assess_with_prior(numbers, prior, WITH_PRIOR, declared=one.spec)
 
 

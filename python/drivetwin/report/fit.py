@@ -106,7 +106,7 @@ def _build_verdict(found: ModelFit) -> VerdictBlock:
 
 
 def _build_parameters(found: ModelFit) -> list[Block]:
-    count = len(found.estimates)
+    count = len(found.sought)
     blocks = build_parameter_blocks(found.estimates, f"{count} unknowns of the model.")
     return [*blocks, *_build_fixed_table(found)]
 
