@@ -33,6 +33,8 @@ OVERRUN = 1e-9
 """Largest slip of a one-way clutch in its blocked direction, relative to the largest speed."""
 BALANCE = 1e-8
 """Largest error of the energy balance, relative to the largest energy of the run."""
+UNRESOLVED = 1e-11
+"""Speed that a run does not distinguish from zero [rad/s]."""
 LONGEST = 10.0
 """Processor time of a run [s]."""
 START = 1e-9
@@ -144,8 +146,18 @@ def survey_cancelling(seeds: Iterable[int]) -> Counter[str]:
         missed = np.abs(begun - stated).max() > START * np.abs(stated).max()
         outcomes["missed start"] += bool(missed)
         size = measure_energy(network, done)
-        outcomes["missed balance"] += abs(done.audit.error) > BALANCE * size
+        allowed = max(BALANCE * size, UNRESOLVED * integrate_torques(network))
+        outcomes["missed balance"] += abs(done.audit.error) > allowed
     return outcomes
+
+
+def integrate_torques(network: RandomNetwork) -> float:
+    """Integral of the magnitudes of all driving torques over a run [N m s]."""
+    elements = network.elements
+    samples = [network.inputs[e["input"]] for e in elements if e["type"] == "torque"]
+    driving = sum(float(np.trapezoid(np.abs(torque), time)) for time, torque in samples)
+    loads = sum(float(e["constant"] + e["rolling"]) for e in elements if e["type"] == "road_load")
+    return driving + loads * SECONDS
 
 
 def survey_resting(seeds: Iterable[int]) -> Counter[str]:
@@ -185,9 +197,10 @@ def test_many_networks_whose_ratios_cancel() -> None:
 
 
 def test_networks_whose_ratios_cancel_start_as_stated_and_close_their_balance() -> None:
-    outcomes = survey_cancelling(range(75))
+    hardly_moving = [411, 1717, 3083, 3193]
+    outcomes = survey_cancelling([*range(75), *hardly_moving])
     assert (outcomes["missed start"], outcomes["missed balance"]) == (0, 0), outcomes
-    assert outcomes["completed"] >= 0.98 * 75, outcomes
+    assert outcomes["completed"] >= 0.98 * 79, outcomes
 
 
 @pytest.mark.exhaustive
@@ -199,7 +212,8 @@ def test_many_networks_at_rest() -> None:
 
 
 def test_networks_at_rest_complete_with_a_number_at_every_point() -> None:
-    assert set(survey_resting(range(10))) == {"completed"}
+    chattered = 19366  # from round-off on the border of a play of no width
+    assert set(survey_resting([*range(10), chattered])) == {"completed"}
 
 
 def test_random_networks_end_without_overrun_and_close_their_balance() -> None:

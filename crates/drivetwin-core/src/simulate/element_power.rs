@@ -45,64 +45,64 @@ impl PowerKind {
     }
 }
 
-/// Hand the powers [W] of all elements, or of one, at an instant to `add`.
+/// Hand torque [N·m] and speed [rad/s] of every power of all elements, or of one, at an instant to `add`.
 pub(super) fn visit_powers<T: Number>(
     state: &HybridState<'_, T>,
     basis: &[T],
     only: Option<&Name>,
-    mut add: impl FnMut(PowerKind, T),
+    mut add: impl FnMut(PowerKind, T, T),
 ) {
     let network = state.network;
     let wanted = |element: &Name| only.is_none_or(|name| name == element);
     let speed = |node| network.node_speed_at(node, basis);
     for (j, row) in network.frictions.iter().enumerate().filter(|(_, f)| wanted(&f.element)) {
         let torque = basis[network.first_channel() + j];
-        add(PowerKind::Friction, torque * form(&row.slip, basis));
+        add(PowerKind::Friction, torque, form(&row.slip, basis));
     }
     for force in network.mechanism.forces.iter().filter(|f| wanted(&f.element)) {
         if let ForceLaw::Constant(torque) = force.law {
             let along =
                 force.nodes.iter().fold(T::zero_(), |sum, &(node, way)| sum + way * speed(node));
-            add(PowerKind::Load, -(torque * along));
+            add(PowerKind::Load, -torque, along);
         }
     }
     for applied in network.applied_torques.iter().filter(|a| wanted(&a.element)) {
         let along =
             applied.nodes.iter().fold(T::zero_(), |sum, &(node, way)| sum + way * speed(node));
-        let power = basis[applied.basis] * along;
+        let torque = basis[applied.basis];
         match applied.account {
-            Some(Account::Source) => add(PowerKind::Source, power),
-            Some(Account::Load) => add(PowerKind::Load, -power),
-            Some(Account::Converter) => add(PowerKind::Converter, -power),
-            Some(Account::Gear) => add(PowerKind::Gear, -power),
-            Some(Account::Drag) => add(PowerKind::Friction, -power),
-            None => add(PowerKind::Damper, -power),
+            Some(Account::Source) => add(PowerKind::Source, torque, along),
+            Some(Account::Load) => add(PowerKind::Load, -torque, along),
+            Some(Account::Converter) => add(PowerKind::Converter, -torque, along),
+            Some(Account::Gear) => add(PowerKind::Gear, -torque, along),
+            Some(Account::Drag) => add(PowerKind::Friction, -torque, along),
+            None => add(PowerKind::Damper, -torque, along),
         }
     }
     let springs = network.mechanism.springs.iter().enumerate();
     for (i, spring) in springs.filter(|(_, s)| wanted(&s.element)) {
         let rate = form(network.twist_rates.row(i), basis);
         let twist = basis[network.speeds() + i];
-        let power = match &spring.law {
-            SpringLaw::Linear { damping, .. } => *damping * rate * rate,
+        let torque = match &spring.law {
+            SpringLaw::Linear { damping, .. } => *damping * rate,
             // The work of the channel less what the stops store.
             SpringLaw::Regions { stops, .. } => {
                 let stored = |stop: &Stop<T>| depth(stop, twist) * stop.stiffness * stop.side;
-                stops.iter().fold(T::zero_(), |sum, stop| sum - stored(stop) * rate)
+                stops.iter().fold(T::zero_(), |sum, stop| sum - stored(stop))
             }
         };
-        add(PowerKind::Damper, power);
+        add(PowerKind::Damper, torque, rate);
     }
     let prescribed = network.prescribed.iter().zip(&network.mechanism.prescribed).enumerate();
     for (i, ((row, _), _)) in prescribed.filter(|(_, (_, p))| wanted(&p.element)) {
         let reaction = form(state.mode.stuck_torque.row(state.mode.stuck.len() + i), basis);
-        add(PowerKind::Source, -(reaction * form(row, basis)));
+        add(PowerKind::Source, -reaction, form(row, basis));
     }
     for (i, gear) in network.losses.iter().enumerate().filter(|(_, g)| wanted(&g.element)) {
         let torque = form(state.mode.gear_torque(network).row(i), basis);
         if let GearState::Meshing { sign, power_reversed } = state.gears[i] {
             let lost = gear.loss.loss_torque(torque, sign, power_reversed);
-            add(PowerKind::Gear, lost * form(&gear.speed, basis));
+            add(PowerKind::Gear, lost, form(&gear.speed, basis));
         }
     }
 }
@@ -156,9 +156,9 @@ impl<T: Number> ElementPower<T> {
             });
         }
         let mut sum = T::zero_();
-        visit_powers(state, basis, Some(&self.element), |kind, power| {
+        visit_powers(state, basis, Some(&self.element), |kind, torque, speed| {
             if kind.is_heat() {
-                sum += power;
+                sum += torque * speed;
             }
         });
         sum

@@ -36,15 +36,29 @@ pub struct EnergyAudit {
 pub(super) struct EnergyBalance {
     audit: EnergyAudit,
     start: f64,
-    /// Largest energy stored and largest work of an account so far, J.
-    largest: f64,
+    scale: BalanceScale,
+    /// Speed that the run does not distinguish from zero, relative to the largest speed and 1 rad/s.
+    resolution: f64,
+}
+
+/// Energies that the error of a balance is judged by, J.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BalanceScale {
+    /// Largest energy stored and largest work of an account.
+    pub largest: f64,
+    /// Energy of all members and work of all torques at the speed that the run does not distinguish from zero.
+    pub unresolved: f64,
 }
 
 impl EnergyBalance {
-    /// Begin at state `x`.
-    pub fn new<T: Real>(network: &Network<T>, x: &[T]) -> Self {
+    /// Begin at state `x`, in a run that resolves speeds to `resolution` of the largest and 1 rad/s.
+    pub fn new<T: Real>(network: &Network<T>, x: &[T], resolution: f64) -> Self {
         let start = stored_energy(network, x);
-        Self { audit: EnergyAudit::default(), start, largest: start }
+        let mass = (0..network.speeds()).map(|i| network.mass[(i, i)].re());
+        let unresolved = resolution * speed_scale(network, x);
+        let unresolved = 0.5 * mass.sum::<f64>() * unresolved * unresolved;
+        let scale = BalanceScale { largest: start, unresolved };
+        Self { audit: EnergyAudit::default(), start, scale, resolution }
     }
 
     /// Add the work of one step.
@@ -55,15 +69,20 @@ impl EnergyBalance {
             self.add_powers(run, &basis, weight * step.length.re());
         }
         let a = &self.audit;
+        let scale = &mut self.scale;
         let works = [a.source, a.friction, a.gear_loss, a.shaft, a.load, a.converter];
         let stored = stored_energy(run.state.network, &run.state.x);
-        self.largest = works.iter().fold(self.largest.max(stored), |most, w| most.max(w.abs()));
+        scale.largest = works.iter().fold(scale.largest.max(stored), |most, w| most.max(w.abs()));
     }
 
     fn add_powers<T: Real>(&mut self, run: &Integrator<'_, T>, basis: &[T], width: f64) {
+        let HybridState { network, mode, .. } = &run.state;
+        let held = (0..mode.stuck.len()).map(|i| form(mode.stuck_torque.row(i), basis).re().abs());
+        let mut torques = held.sum::<f64>();
         let audit = &mut self.audit;
-        visit_powers(&run.state, basis, None, |kind, power| {
-            let work = power.re() * width;
+        visit_powers(&run.state, basis, None, |kind, torque, speed| {
+            torques += torque.re().abs();
+            let work = (torque * speed).re() * width;
             match kind {
                 PowerKind::Source => audit.source += work,
                 PowerKind::Load => audit.load += work,
@@ -76,10 +95,11 @@ impl EnergyBalance {
                 }
             }
         });
+        self.scale.unresolved += self.resolution * speed_scale(network, basis) * torques * width;
     }
 
-    /// Close the balance at the state reached; return it and the largest energy of the run, J.
-    pub fn close<T: Real>(mut self, state: &HybridState<'_, T>) -> (EnergyAudit, f64) {
+    /// Close the balance at the state reached.
+    pub fn close<T: Real>(mut self, state: &HybridState<'_, T>) -> (EnergyAudit, BalanceScale) {
         let a = &mut self.audit;
         a.source += state.starting_impulse.source.re();
         a.impulse = state.starting_impulse.lost.re();
@@ -88,8 +108,14 @@ impl EnergyBalance {
             a.stored + a.friction + a.gear_loss + a.shaft + a.load + a.converter + a.impulse;
         a.error = a.source - taken;
         let impulse = a.impulse.abs().max(state.starting_impulse.source.re().abs());
-        (self.audit, self.largest.max(impulse))
+        self.scale.largest = self.scale.largest.max(impulse);
+        (self.audit, self.scale)
     }
+}
+
+/// Scale of the speeds at an instant: the largest, at least 1 rad/s.
+fn speed_scale<T: Real>(network: &Network<T>, x: &[T]) -> f64 {
+    x[..network.speeds()].iter().fold(1.0, |largest, speed| speed.re().abs().max(largest))
 }
 
 fn stored_energy<T: Real>(network: &Network<T>, x: &[T]) -> f64 {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! One run of a network over a time grid.
 
-use super::energy_balance::EnergyBalance;
+use super::energy_balance::{BalanceScale, EnergyBalance};
 use super::output::{Output, Target};
 use super::start::{Start, StartError, State};
 use super::trajectory::{Recorder, Trajectory};
@@ -156,14 +156,15 @@ impl<T: Real> Plan<T> {
     }
 
     /// Refuse an energy balance that does not close to the accuracy of the run.
-    fn check_audit(&self, time: f64, error: f64, energy: f64) -> Result<(), Status> {
+    fn check_audit(&self, time: f64, error: f64, scale: BalanceScale) -> Result<(), Status> {
+        let energy = scale.largest;
         if self.settings.order.is_some() {
             return Ok(());
         }
         if !error.is_finite() || !energy.is_finite() {
             return Err(Status::NotFinite { time });
         }
-        match error.abs() <= self.settings.audit_tolerance(energy) {
+        match error.abs() <= self.settings.audit_tolerance(energy, scale.unresolved) {
             true => Ok(()),
             false => Err(Status::OpenBalance { time, error, energy }),
         }
@@ -189,12 +190,12 @@ impl<T: Real> Plan<T> {
             let cache = std::mem::replace(known, SolverCache::new(network));
             let mut run = self.integrator(cache, x.clone(), &start.locked)?;
             let outcome = if self.audit {
-                let mut auditor = EnergyBalance::new(network, &x);
+                let mut auditor = EnergyBalance::new(network, &x, self.settings.speed_resolution());
                 let outcome =
                     recorder.run_to_end_with(&mut run, |run, step| auditor.add(run, step));
-                let (audit, largest) = auditor.close(&run.state);
+                let (audit, scale) = auditor.close(&run.state);
                 balance = Some(audit);
-                outcome.and_then(|()| self.check_audit(run.time().re(), audit.error, largest))
+                outcome.and_then(|()| self.check_audit(run.time().re(), audit.error, scale))
             } else {
                 recorder.run_to_end(&mut run)
             };

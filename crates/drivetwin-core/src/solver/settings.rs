@@ -2,7 +2,7 @@
 //! Accuracy settings of a run.
 
 use crate::solver::tolerances::{
-    AUDIT_ATOL, AUDIT_PER_TRUNCATION, AUDIT_RTOL, TAYLOR_TOL, TAYLOR_TOL_BETWEEN_SAMPLES,
+    AUDIT_PER_TRUNCATION, AUDIT_RTOL, TAYLOR_TOL, TAYLOR_TOL_BETWEEN_SAMPLES, ZERO_SLIP_RTOL,
 };
 
 /// Accuracy of the integration.
@@ -28,10 +28,17 @@ impl Settings {
         Accuracy { tolerance: self.tolerance.max(least), order: self.order }
     }
 
-    /// Error of the energy balance that a completed run of this largest energy may have, J.
-    pub(crate) fn audit_tolerance(&self, energy: f64) -> f64 {
+    /// Speed that a run does not distinguish from zero, relative to the largest speed and 1 rad/s: a slip that counts
+    /// as zero is removed, and a truncation error adds one.
+    pub(crate) fn speed_resolution(&self) -> f64 {
+        ZERO_SLIP_RTOL.max(self.tolerance)
+    }
+
+    /// Error of the energy balance that a completed run may have, J: relative to the largest `energy`, and of a run
+    /// that hardly moves the energy that is `unresolved` because of [`Self::speed_resolution`].
+    pub(crate) fn audit_tolerance(&self, energy: f64, unresolved: f64) -> f64 {
         let rtol = AUDIT_RTOL.max(self.tolerance * AUDIT_PER_TRUNCATION);
-        (rtol * energy).max(AUDIT_ATOL)
+        (rtol * energy).max(unresolved)
     }
 
     /// Round-off accuracy throughout.

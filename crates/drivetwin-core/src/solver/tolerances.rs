@@ -52,9 +52,6 @@ pub(crate) const JUMP_ENERGY_RTOL: f64 = 1e-8;
 pub(crate) const RUNAWAY: f64 = 1e4;
 /// Error of the energy balance of a run, relative to its largest energy.
 pub(crate) const AUDIT_RTOL: f64 = 1e-8;
-/// Error of the energy balance without meaning, J: a torque of 1000 N·m for 1 s at a slip that counts as
-/// zero, [`ZERO_SLIP_RTOL`].
-pub(crate) const AUDIT_ATOL: f64 = 1e-8;
 /// Error of the energy balance per truncation error of a step, where a larger one is asked for.
 pub(crate) const AUDIT_PER_TRUNCATION: f64 = 1e4;
 /// Slip that a stalled run can have gained within [`STALL_NUDGE`], rad/s.

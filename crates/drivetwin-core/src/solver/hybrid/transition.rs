@@ -45,6 +45,9 @@ impl<T: Number> HybridState<'_, T> {
             }
             EventCause::Stalled => {
                 self.apply_locking_impulse(&self.nearly_at_rest())?;
+                for i in self.rows.len()..self.network.channels.len() {
+                    self.branches[i] = self.cell_now(i);
+                }
                 self.decide(None)
             }
             EventCause::BranchBoundary(channel, branch) => {
