@@ -169,6 +169,7 @@ class Code(StrEnum):
     DEPENDS_ON_PRIOR = auto()
     DISAGREEING_LOG = auto()
     SENSOR_LIMITED = auto()
+    EFFECT_LIMITED = auto()
     CARD_RATIO_UNUSUAL = auto()
     CARD_EFFICIENCY_UNUSUAL = auto()
     CARD_GAIN_UNUSUAL = auto()

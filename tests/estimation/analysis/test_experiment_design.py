@@ -59,7 +59,7 @@ def test_order_is_by_worth_and_least_known_are_told_too() -> None:
         assert widths[0] < one.half_width
 
 
-def test_what_sensors_decide_no_experiment_narrows() -> None:
+def test_no_experiment_narrows_an_interval_that_effects_decide() -> None:
     found = stepped()
     c_o = found.estimates["c_o"]
     assert c_o.std_noise is not None
@@ -67,7 +67,7 @@ def test_what_sensors_decide_no_experiment_narrows() -> None:
     ranked = _rank(replace(found, estimates={**found.estimates, "c_o": wide}))
     (one,) = (s for s in ranked if s.parameter == "c_o")
     assert not one.prospects
-    assert "Calibrate the sensors" in one.text
+    assert "Record another manoeuvre" in one.text
 
 
 def test_an_identification_takes_up_what_would_tell_it_more() -> None:

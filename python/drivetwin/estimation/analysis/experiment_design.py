@@ -50,7 +50,7 @@ from drivetwin.estimation.result.suggestion import (
     Experiment,
     ExperimentRanking,
 )
-from drivetwin.estimation.result.verdict import VERDICT, assess, is_sensor_limited
+from drivetwin.estimation.result.verdict import VERDICT, assess, is_limited
 from drivetwin.findings import Code, explain
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Signal
@@ -388,6 +388,8 @@ class _Linearisation:
     fit: LikelihoodFit
     values: Mapping[str, float]
     jacobian: FloatArray
+    limit: Code
+    """Finding on an interval that more data do not narrow."""
 
     def get_row(self, name: str, names: tuple[str, ...]) -> FloatArray:
         """Return the derivative (r,) of a parameter by the unknowns `names`."""
@@ -408,7 +410,7 @@ def _linearise(found: Identification) -> _Linearisation:
         return compute_parameters(fit.problem, at, signals, slips)
 
     slopes = differentiate(compute, fit.point, np.sqrt(np.diag(fit.covariance)))
-    return _Linearisation(fit, compute(fit.point), slopes)
+    return _Linearisation(fit, compute(fit.point), slopes, found.limit)
 
 
 def _rank_for_parameter(
@@ -419,8 +421,8 @@ def _rank_for_parameter(
     if one.id not in values:
         return ExperimentRanking(one.id, one.verdict, half, (), NO_SCALE)
     systematic = one.std_systematic or 0.0
-    if one.std_noise is not None and is_sensor_limited(one.std_noise, systematic):
-        return ExperimentRanking(one.id, one.verdict, half, (), explain(Code.SENSOR_LIMITED))
+    if one.std_noise is not None and is_limited(one.std_noise, systematic):
+        return ExperimentRanking(one.id, one.verdict, half, (), explain(base.limit))
     names = _add_delay(fit).names
     row = base.get_row(one.id, names)
     if not row.any():  # specific to another log

@@ -11,6 +11,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.suggestion import CardNumber, CardNumberKind, ExperimentRanking
 from drivetwin.estimation.result.verdict import get_advice
+from drivetwin.findings import Code
 from drivetwin.report.blocks import (
     Block,
     Cell,
@@ -145,7 +146,7 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
     for width, name in ranked:
         one = found.estimates[name]
         interval = f"± {format_significant(width, 2)} %"
-        share, advice = _describe_sensor_share(one), _write_advice(one)
+        share, advice = _describe_sensor_share(one), _write_advice(one, found.limit)
         rows.append((make_parameter_cell(name), interval, share, advice))
     columns = (
         "parameter",
@@ -161,8 +162,8 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
     )
 
 
-def _write_advice(one: Estimate) -> str:
-    return get_advice(one.id, one.std_noise or 0.0, one.std_systematic)
+def _write_advice(one: Estimate, limit: Code) -> str:
+    return get_advice(one.id, one.std_noise or 0.0, one.std_systematic, limit=limit)
 
 
 def _describe_sensor_share(one: Estimate) -> str:
