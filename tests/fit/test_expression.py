@@ -121,7 +121,10 @@ def test_any_text_is_a_formula_or_refused(text: str) -> None:
     assert set(found.of) <= set(NAMES)
 
 
-SOUGHT = {"scale": Unknown(420.0, 100.0, (0.0, None)), "ratio": Unknown(1.9, 0.5, (0.0, None))}
+SOUGHT = {
+    "scale": Unknown(420.0, 100.0, (0.0, None), unit="N*m/rad"),
+    "ratio": Unknown(1.9, 0.5, (0.0, None)),
+}
 ELEMENTS = ("motor", "left wheel", "right wheel", "left", "right")
 EXACT = {name: Tolerance(exact=True) for name in ELEMENTS}
 
@@ -154,6 +157,9 @@ def test_functions_set_numbers_and_are_reported(product: str | Callable[..., flo
         assert estimate.spec is not None
         assert estimate.spec.unit == "N*m/rad"
         assert found.intervals[name] == pytest.approx(direct.intervals[name], rel=1e-3)
+    units = {name: one.unit for name, one in found.estimates.items()}
+    assert (units["scale"], units["ratio"]) == ("N*m/rad", "1")
+    assert direct.estimates["excess"].unit == "N*m/rad"
     excess = direct.values["excess"]
     difference = direct.values["right.stiffness"] - direct.values["left.stiffness"]
     assert excess == pytest.approx(difference)
@@ -187,6 +193,8 @@ def test_a_prior_on_a_function_is_a_row() -> None:
         ({"left.stiffness": Expression("log(ratio - 2)")}, "nan at the first guesses"),
         ({"left.stiffness": Expression("-scale")}, "-420 at the first guesses, not within 0"),
         ({"left.stiffness": Expression("scale", std=1.0)}, "a prior has value and std"),
+        ({"left.stiffness": Expression("scale", value=0.0, std=1.0)}, "the value 0 is outside 0"),
+        ({"left.stiffness": Expression("scale", value=1.0, std=0.0)}, "deviation 0 is no spread"),
         ({"left.stiffness": Expression(math.exp, ("ratio",))}, "the derivative by 'ratio' is 0"),
         ({"left.stiffness": Expression(lambda x: x, ("rato",))}, "did you mean 'ratio'"),
         ({"both": Expression("ratio", paths=[])}, "scale: no number of the model"),

@@ -132,7 +132,9 @@ def models(draw: st.DrawFn) -> tuple[NetworkModel, ModelChannels]:
     unknowns = {f"{parts[0]}.inertia": Unknown(draw(positive), draw(st.none() | positive), bounds)}
     others = {f"{name}.inertia": draw(positive) for name in parts[1 : len(nodes)]}
     if others:
-        unknowns[draw(names)] = Unknown(draw(positive), paths=others)
+        unknowns[draw(names)] = Unknown(
+            draw(positive), paths=others, unit=draw(st.just("") | names)
+        )
     outputs = {draw(names): ("speed", nodes[0])}
     spread = Expression(f"2 * {next(iter(unknowns))!r}", paths=[], value=1.0, std=draw(positive))
     expressions = {"spread": spread} if "spread" not in unknowns else {}
@@ -156,7 +158,7 @@ def describe(model: NetworkModel, channels: ModelChannels) -> dict[str, Any]:
     """Return all that a file states as plain data."""
     start, described = model.start, vars(model) | vars(channels)
     unknowns = {
-        name: (one.value, one.std, one.bounds, get_factors(name, one.paths))
+        name: (one.value, one.std, one.bounds, get_factors(name, one.paths), one.unit)
         for name, one in model.unknowns.items()
     }
     plain = (dict(start.speeds), dict(start.twists), list(start.locked))

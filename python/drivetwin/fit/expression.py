@@ -27,6 +27,7 @@ from drivetwin.fit.unknown import (
     describe_places,
     get_factors,
     require_distinct_places,
+    require_sound,
     resolve_unknown,
 )
 from drivetwin.simulation.variable import Variable
@@ -155,8 +156,7 @@ def _resolve_expression(
     places: Mapping[str, Place],
 ) -> DerivedNumber:
     factors = get_factors(name, one.paths)
-    spec, is_scale = describe_places(name, factors, places, (None, None))
-    spec = spec if factors else replace(spec, unit=one.unit or "1")
+    spec, is_scale = describe_places(name, factors, places, (None, None), one.unit)
     arguments = tuple(sought[each] for each in formula.of)
     found = DerivedNumber(name, one, factors, False, spec, arguments, formula.compute)
     point = ParameterVector(formula.of, np.array([each.start for each in arguments]))
@@ -166,10 +166,13 @@ def _resolve_expression(
             f"{name}: {value:g} at the first guesses, not within {spec.lower:g} to {spec.upper:g}"
         )
         raise InputError(what, "correct the formula, or the first guesses of its unknowns")
+    _require_derivatives(found, point, slopes)
+    found = replace(found, is_positive=is_scale and spec.lower >= 0.0 and value > 0.0)
     if (one.value is None) != (one.std is None):
         raise InputError(f"{name}: a prior has value and std", "state both, or none")
-    _require_derivatives(found, point, slopes)
-    return replace(found, is_positive=is_scale and spec.lower >= 0.0 and value > 0.0)
+    if one.value is not None:
+        require_sound(found)
+    return found
 
 
 _STEP, _AGREEMENT = 1e-6, 1e-3

@@ -421,6 +421,8 @@ def _format_unknown(name: str, one: Unknown) -> list[str]:
         lines.append(format_entry("bounds", ends))
     if one.paths is not None:
         lines.append(format_entry("paths", get_factors(name, one.paths)))
+    if one.unit:
+        lines.append(format_entry("unit", one.unit))
     return lines
 
 

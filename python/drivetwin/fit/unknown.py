@@ -48,6 +48,8 @@ class Unknown:
     paths
         Paths on which it acts, with a factor for each; None where its name is the path. With
         several paths it is shared: `{"B2.friction.mu_c": 1.0, "B3.friction.mu_c": 1.0}`.
+    unit
+        SI unit of a number without a path, which acts through expressions alone.
     """
 
     value: float
@@ -56,6 +58,7 @@ class Unknown:
         Bounds, BeforeValidator(_read_bounds, json_schema_input_type=tuple[float, float])
     ] = (None, None)
     paths: Paths = None
+    unit: str = ""
 
     @classmethod
     def read(cls, stated: Unknown | tuple[float, float] | float) -> Unknown:
@@ -162,17 +165,21 @@ def resolve_unknown(
         factors = {}
     if not factors and not named:
         raise InputError(f"{name}: there is no path", "name at least one path that it acts on")
-    spec, is_scale = describe_places(name, factors, places, unknown.bounds)
+    spec, is_scale = describe_places(name, factors, places, unknown.bounds, unknown.unit)
     is_positive = spec.lower >= 0.0 and unknown.value > 0.0 and is_scale
     found = SoughtNumber(name, unknown, factors, is_positive, spec)
-    _require_sound(found)
+    require_sound(found)
     return found
 
 
 def describe_places(
-    name: str, factors: Mapping[str, float], places: Mapping[str, Place], bounds: Bounds
+    name: str,
+    factors: Mapping[str, float],
+    places: Mapping[str, Place],
+    bounds: Bounds,
+    unit: str,
 ) -> tuple[ParameterSpec, bool]:
-    """Describe a number that acts on paths with factors, within bounds.
+    """Describe a number that acts on paths with factors, within bounds; without a path in a `unit`.
 
     The second value is False where zero is a value like others: of starts, delays and offsets.
     Raises InputError for a path that leads to no number, and for a factor that is none.
@@ -187,7 +194,7 @@ def describe_places(
         stem=name,
         name=name,
         symbol=name,
-        unit=(first.unit.translate(ASCII_UNITS) if first else "") or "1",
+        unit=(first.unit.translate(ASCII_UNITS) if first else unit) or "1",
         meaning=first.help if first else "",
         lower=low,
         upper=high,
@@ -195,9 +202,13 @@ def describe_places(
     return spec, not any(one.field in ("start", "delay", "offset") for one in found)
 
 
-def _require_sound(one: SoughtNumber) -> None:
+def require_sound(one: PlacedNumber) -> None:
+    """Raise InputError for a stated value beyond its bounds, and for a prior that is no spread."""
     given, name, spec = one.stated, one.name, one.spec
-    if not math.isfinite(given.value) or not spec.lower <= given.value <= spec.upper:
+    inside = spec.lower <= given.value <= spec.upper and not (
+        one.is_positive and given.value == 0.0
+    )
+    if not (inside and math.isfinite(given.value)):
         what = f"{name}: the value {given.value:g} is outside {spec.lower:g} to {spec.upper:g}"
         raise InputError(what, "correct the value or its bounds")
     if given.std is not None and not (math.isfinite(given.std) and given.std > 0.0):
