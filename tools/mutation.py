@@ -165,7 +165,12 @@ def run_mutant(mutant: Mutant, tests: Sequence[str], tree: Path) -> dict[str, An
     finally:
         path.write_text(text, encoding="utf-8")
     by = next(
-        (one.split()[1] for one in output.splitlines() if one[:6] in ("FAILED", "ERROR ")), ""
+        (
+            one.split()[1]
+            for one in output.splitlines()
+            if one.startswith(("FAILED ", "ERROR tests"))
+        ),
+        "",
     )
     outcome = SURVIVED if code == 0 else TIMEOUT if code < 0 else KILLED
     return {"outcome": outcome, "by": by, "tests": len(tests)}

@@ -22,6 +22,7 @@ from tools.mutation import FOLDER, MODULES
 
 PACKAGE = Path(drivetwin.__file__).parent
 _seconds: defaultdict[str, float] = defaultdict(float)
+_failed: set[str] = set()
 _recorder = coverage.Coverage(
     data_file=None, include=[str(PACKAGE / one) for one in MODULES], config_file=False
 )
@@ -43,6 +44,12 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
         _seconds[test] += time.perf_counter() - begun
 
 
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Note tests that fail without a mutant: they cannot reject one."""
+    if report.failed:
+        _failed.add(report.nodeid.partition("[")[0])
+
+
 def pytest_sessionfinish() -> None:
     """Write what this worker recorded."""
     _recorder.stop()
@@ -51,7 +58,7 @@ def pytest_sessionfinish() -> None:
     data = _recorder.get_data()
     lines = {
         module: {
-            str(line): sorted({*tests} - {""})
+            str(line): sorted({*tests} - {""} - _failed)
             for line, tests in data.contexts_by_lineno(str(PACKAGE / module)).items()
         }
         for module in MODULES
