@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,7 +30,7 @@ from drivetwin.fit.fixed_numbers import Tolerance, list_fixed
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import to_output
 from drivetwin.fit.recording import Samples
-from drivetwin.fit.unknown import Unknown, get_factors
+from drivetwin.fit.unknown import Unknown
 from drivetwin.simulation.element_schema import (
     ELEMENT_FIELDS,
     FieldKind,
@@ -379,17 +378,14 @@ def format_model(model: NetworkModel, channels: ModelChannels | None = None) -> 
     lines.append(format_entry("twists", dict(start.twists)))
     lines.append(format_entry("locked", list(start.locked)))
     lines.append(format_entry("known", list(channels.known) if channels else []))
-    for name, one in model.unknowns.items():
-        lines += ["", f"[unknowns.{format_key(name)}]", *_format_unknown(name, one)]
     for name, expression in model.expressions.items():
         if not isinstance(expression.formula, str):
             what = f"the expression {name!r} is a function, which a model file cannot state"
             raise InputError(what, "state it as a text")
-        lines += ["", f"[expressions.{format_key(name)}]"]
-        lines += [format_entry(*item) for item in list_stated(expression).items()]
-    for path, tolerance in model.tolerances.items():
-        lines += ["", f"[tolerances.{format_key(path)}]"]
-        lines += [format_entry(*item) for item in list_stated(tolerance).items()]
+    for kind in ("unknowns", "expressions", "tolerances"):
+        for name, one in getattr(model, kind).items():
+            lines += ["", f"[{kind}.{format_key(name)}]"]
+            lines += [format_entry(*item) for item in list_stated(one).items()]
     if channels is not None and channels.run is not None:
         lines += _format_run(channels.run)
     return "\n".join(lines) + "\n"
@@ -408,21 +404,6 @@ def _format_inputs(
         lines += ["", f"[inputs.{format_key(name)}]", format_entry("value", value)]
     for name, spec in recorded.items():
         lines += ["", f"[inputs.{format_key(name)}]", *_format_spec(spec, roles.get(name))]
-    return lines
-
-
-def _format_unknown(name: str, one: Unknown) -> list[str]:
-    lines = [format_entry("value", one.value)]
-    if one.std is not None:
-        lines.append(format_entry("std", one.std))
-    low, high = one.bounds
-    if low is not None or high is not None:
-        ends = [-math.inf if low is None else low, math.inf if high is None else high]
-        lines.append(format_entry("bounds", ends))
-    if one.paths is not None:
-        lines.append(format_entry("paths", get_factors(name, one.paths)))
-    if one.unit:
-        lines.append(format_entry("unit", one.unit))
     return lines
 
 

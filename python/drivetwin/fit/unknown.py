@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, PlainSerializer
 
 from drivetwin.errors import InputError
 from drivetwin.fit.places import Place, find_place
@@ -30,6 +30,12 @@ def _read_bounds(stated: object) -> object:
     if len(ends) == len(stated) == 2 and not ends[0] < ends[1]:
         raise ValueError("bounds are the least and the largest value")
     return tuple(None if one in (-math.inf, math.inf) else one for one in stated)
+
+
+def _write_bounds(bounds: Bounds) -> list[float]:
+    """Write bounds as two numbers of a file."""
+    low, high = bounds
+    return [-math.inf if low is None else low, math.inf if high is None else high]
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,9 @@ class Unknown:
     value: float
     std: Annotated[float, Field(gt=0)] | None = None
     bounds: Annotated[
-        Bounds, BeforeValidator(_read_bounds, json_schema_input_type=tuple[float, float])
+        Bounds,
+        BeforeValidator(_read_bounds, json_schema_input_type=tuple[float, float]),
+        PlainSerializer(_write_bounds),
     ] = (None, None)
     paths: Paths = None
     unit: str = ""
