@@ -166,9 +166,9 @@ fuzz: $(venv)/.dev native ## 20,000 damaged files through each reader, for an ho
 	$(bin)/python -m tests.fuzz.run --count 20000
 
 .PHONY: fuzz-identify
-fuzz-identify: $(venv)/.dev native ## 2,000 harmless and 2,000 damaged logs through `identify` by two methods, for some hours
+fuzz-identify: $(venv)/.dev native ## 2,000 harmless and 2,000 damaged logs through `identify`, quick and whole, for some hours
 	$(bin)/python -m tests.fuzz.identified --count 2000
-	$(bin)/python -m tests.fuzz.identified --count 2000 --method likelihood
+	$(bin)/python -m tests.fuzz.identified --count 2000 --whole
 
 fleet_logs ?= 10000
 .PHONY: fleet

@@ -32,6 +32,7 @@ from drivetwin._util.rich_display import register_presenter
 if TYPE_CHECKING:
     from drivetwin.errors import DrivetwinError
     from drivetwin.estimation.analysis.experiment_design import rank_experiments
+    from drivetwin.estimation.likelihood.mechanism import quick
     from drivetwin.estimation.result.method import Method
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_file import load_twin, save_twin
@@ -70,6 +71,7 @@ _HOME = {
     "detect_shifts": ("shifts.detect", "detect_shifts"),
     "identify": ("pipeline", "identify"),
     "identify_validated": ("validation.validated_model", "identify_validated"),
+    "quick": ("estimation.likelihood.mechanism", "quick"),
     "load_card": ("vehicle.card", "load_card"),
     "load_twin": ("files.twin_file", "load_twin"),
     "read_arrays": ("logs.arrays", "read_arrays"),
@@ -101,6 +103,7 @@ __all__ = [
     "identify_validated",
     "load_card",
     "load_twin",
+    "quick",
     "rank_experiments",
     "read_arrays",
     "read_log",

@@ -21,9 +21,9 @@ from drivetwin.estimation.data.actuators import (
 )
 from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
+from drivetwin.estimation.direct.output_torque_delay import align_output_torque
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
-from drivetwin.estimation.linear.output_torque_delay import align_output_torque
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
@@ -116,7 +116,7 @@ def identify(
     if locks and method is Method.PAPER:
         raise InputError(
             "the paper's method takes no fixed values, priors and bounds",
-            "use the integral or the likelihood method",
+            "use the likelihood method",
         )
     stages = _BY_METHOD[method]
     with stages.enter("preparation", "preparing the log"):

@@ -34,7 +34,7 @@ from drivetwin.bus.quantities import SQUARE
 from drivetwin.bus.recording import Signal, average_neighbours
 from drivetwin.bus.scatter import Combined, ShiftValue, combine
 from drivetwin.bus.torque import compute_swing_response, integrate_torque
-from drivetwin.estimation.linear.ringdown import RING_DOWN
+from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.findings import Code, Number, explain
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import Z95

@@ -44,7 +44,7 @@ from drivetwin.bus.torque_estimates import estimate_torques, find_dead_time
 from drivetwin.bus.unknown_ratios import find_unknown_ratios
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
-from drivetwin.estimation.linear.ringdown import RING_DOWN
+from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain, report

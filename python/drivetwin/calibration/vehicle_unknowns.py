@@ -12,8 +12,8 @@ from scipy.linalg import block_diag
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.calibration.scenarios import TwinDraws
 from drivetwin.calibration.spread import Spread
+from drivetwin.estimation.direct.friction_law import build_law_derivatives
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.estimation.linear.friction_points import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drivetwin._util.request import REQUIRED, FileRole, Request, argument, input_file, option
+from drivetwin._util.request import REQUIRED, FileRole, Request, argument, flag, input_file, option
 from drivetwin.estimation.result.method import DEFAULT_METHOD
 
 if TYPE_CHECKING:
@@ -48,8 +48,12 @@ def mapping_option() -> Any:
 
 def method_option() -> Any:
     """Declare the method of an identification."""
-    help = "paper, integral or likelihood."
-    return option(help, metavar="METHOD", default=DEFAULT_METHOD)
+    return option("likelihood or paper.", metavar="METHOD", default=DEFAULT_METHOD)
+
+
+def quick_option() -> Any:
+    """Declare the identification by one model."""
+    return flag("Fit one model, and try no other sampling modes, minima and elements.")
 
 
 class TwinInput(Request):

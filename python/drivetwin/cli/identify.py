@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from drivetwin._util.request import FileRole, Request, flag, input_file, option, output_folder
-from drivetwin.cli.arguments import logs_argument, mapping_option, method_option
+from drivetwin.cli.arguments import logs_argument, mapping_option, method_option, quick_option
 from drivetwin.cli.atomic_outputs import refuse_same_names
 from drivetwin.cli.identify_run import IdentifyOptions, effects_option
 from drivetwin.cli.output import print_blocks, print_json, print_line, show_error, to_error_document
@@ -38,6 +38,7 @@ class Identify(Request, command="identify"):
     )
     channels: Path | None = mapping_option()
     method: Method = method_option()
+    quick: bool = quick_option()
     effects: tuple[str, ...] = effects_option()
     output: Path | None = output_folder("Folder for result, twin and report.")
     together: bool = flag("Fit all logs of one vehicle jointly.")

@@ -15,6 +15,7 @@ from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
 from drivetwin.cli.identify_run import IdentifyOptions, read_shifts
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.errors import InputError, Where
+from drivetwin.estimation.likelihood.mechanism import quick
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
@@ -64,7 +65,7 @@ def identify_logs(
     sources = [
         Source(log, found, each) for log, found, each in zip(read, shifts, held, strict=True)
     ]
-    with show_step(f"identifying by the {how.method} method"):
+    with show_step(f"identifying by the {how.method} method"), quick(how.quick):
         made = identify_together(sources, card, how.method)
     with show_step("comparing experiments"):
         found = rank_for_weak(made.found)

@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.progress import TimedStages
 from drivetwin._util.request import option
-from drivetwin.cli.arguments import REPORT, RESULT, TWIN, CardInput, find_mapping, method_option
+from drivetwin.cli.arguments import (
+    REPORT,
+    RESULT,
+    TWIN,
+    CardInput,
+    find_mapping,
+    method_option,
+    quick_option,
+)
 from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step
+from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
 from drivetwin.vehicle.effects import parse_priors
 
@@ -40,6 +49,7 @@ class IdentifyOptions(CardInput):
     """Card, channel mapping and method of an identification, and priors of effects as typed."""
 
     method: Method = method_option()
+    quick: bool = quick_option()
     effects: tuple[str, ...] = effects_option()
 
     def load_card(self) -> VehicleCard:
@@ -93,7 +103,7 @@ def run_identification(log: Path, how: IdentifyOptions) -> Outcome:
         recording, shifts, doubts = read_shifts(log, how, card)
     show_findings(doubts)
     refuse_without_shifts(recording, card, shifts)
-    with show_step(f"identifying by the {how.method} method"):
+    with show_step(f"identifying by the {how.method} method"), quick(how.quick):
         model = identify_validated(recording, card, shifts, how.method)
     found = model.result
     if found.method is Method.LIKELIHOOD:

@@ -24,8 +24,8 @@ from drivetwin.report.blocks import TableBlock, make_table
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
-    from drivetwin.estimation.linear.inertia_in_gear import HeldGear
-    from drivetwin.estimation.linear.resonance import Resonance
+    from drivetwin.estimation.direct.inertia_in_gear import HeldGear
+    from drivetwin.estimation.direct.resonance import Resonance
     from drivetwin.shifts.detect import FoundShifts
     from drivetwin.shifts.lockup_clutch import LockUp
     from drivetwin.shifts.shift import Shift
@@ -154,8 +154,8 @@ def _estimate_from_speeds(
     log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
 ) -> _SpeedResults:
     from drivetwin.estimation.data.prepare_gears import prepare_gears, prepare_input_speed
-    from drivetwin.estimation.linear.inertia_in_gear import estimate_gear_inertias
-    from drivetwin.estimation.linear.resonance import find_shift_resonance
+    from drivetwin.estimation.direct.inertia_in_gear import estimate_gear_inertias
+    from drivetwin.estimation.direct.resonance import find_shift_resonance
 
     if "output_torque" in log:
         return _SpeedResults()

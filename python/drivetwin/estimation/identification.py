@@ -34,7 +34,6 @@ from drivetwin.shifts.shift import RejectedShift, Shift
 if TYPE_CHECKING:
     from drivetwin.estimation.data.shift_data import ShiftSignals
     from drivetwin.estimation.likelihood.fit import LikelihoodFit
-    from drivetwin.estimation.linear.pipeline import IntegralShift
     from drivetwin.estimation.paper.pipeline import PaperShift
     from drivetwin.estimation.result.cause import Cause, PredictedSpread
     from drivetwin.estimation.result.suggestion import CardNumber, ExperimentRanking
@@ -149,13 +148,11 @@ class StageResults:
     paper: tuple[PaperShift, ...] = ()
     """The paper's stages on each shift: beside the other methods for comparison, where it can be
     computed and the log has an output torque."""
-    integral: tuple[IntegralShift, ...] = ()
-    """The integral method on each shift, from which the likelihood method starts; empty by the
-    paper's method and without an output torque."""
     likelihood: LikelihoodFit | None = None
-    """Common fit of all shifts; None for another method, or if the fit did not converge."""
+    """Common fit of all shifts; None for the paper's method, or if the fit did not converge."""
     gave_up: str = ""
-    """Reason why the likelihood method failed; empty if it converged or was not requested."""
+    """Reason why the likelihood method failed, so that the values are the paper's; empty if it
+    converged or was not requested."""
     loads: tuple[float, ...] = ()
     """Load of each shift at the output shaft [N m] where they differ, as on hills, T_v/i_f is then
     their mean; empty where the shifts of a log share one."""

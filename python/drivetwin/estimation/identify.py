@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Identification of a driveline from the prepared shifts of one log, by one of three methods.
+"""Identification of a driveline from the prepared shifts of one log, by one of two methods.
 
 The likelihood is imported where it runs: its modules take longer to load than the paper's method
 takes.
@@ -18,7 +18,7 @@ from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import DesignData, PreparedLog
 from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification, StageResults
-from drivetwin.estimation.linear.estimates import add_tolerances, estimate_integral
+from drivetwin.estimation.likelihood.mechanism import is_quick
 from drivetwin.estimation.paper.pipeline import (
     PaperShift,
     assess_paper_shifts,
@@ -60,27 +60,29 @@ COMMON_GAIN = (
 """Degenerate errors: the log contains nothing that shows them."""
 GROWS = "grows with the square of the wheel speed and else "
 """Clause added to the assumptions if an aerodynamic load term was estimated."""
-_LIKELIHOOD = TimedStages("likelihood estimation", ("linear", "likelihood", "paper"))
-_INTEGRAL = TimedStages("integral estimation", ("linear", "tolerances", "paper"))
+ONE_MODEL = (
+    "quick identification: the load is constant in each shift and all signals are as read; other "
+    "sampling modes, minima and elements were not tried"
+)
+_LIKELIHOOD = TimedStages("likelihood estimation", ("likelihood", "paper"))
 
 
-def identify(
-    log: PreparedLog, method: Method = DEFAULT_METHOD, *, with_plants: bool = True
-) -> Identification:
+def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identification:
     """Identify the driveline from all prepared shifts of a log.
 
-    The paper's stages run beside the other methods for comparison. The likelihood method starts
-    from the integral one, or alone where that has no equation, and leaves the integral result with
-    a warning where it does not converge. The results of each stage are in `evidence`. With
-    `with_plants` elements beside the dual clutch are tried.
+    The paper's stages run beside the likelihood for comparison, and give the values where that
+    fails. The results of each stage are in `evidence`.
     Raises IdentificationError if the data cannot carry the method.
     """
-    if log.scale_known:
-        if method is not Method.PAPER:
-            log = drop_unbalanced(log)
-        found, method, evidence = _estimate_torque_log(log, method, with_plants=with_plants)
-    else:
-        found, evidence = _estimate_torqueless_log(log, method, with_plants=with_plants)
+    if method is Method.PAPER and not log.scale_known:
+        raise IdentificationError(
+            "the log has no output torque, without which the paper's method has no equation",
+            "map an output-shaft torque sensor as 'output_torque', or use the likelihood method",
+            Where(file=log.source),
+        )
+    if method is not Method.PAPER and log.scale_known:
+        log = drop_unbalanced(log)
+    found, method, evidence = _estimate(log, method)
     shifts, design = tuple(s.shift for s in log.signals), log.design
     estimates, gains = check_efficiency_limit(found.estimates, design.loss_law)
     findings = (
@@ -159,49 +161,26 @@ def _report_unfitted(log: PreparedLog) -> list[Finding]:
 _Stage = tuple[EstimateSet, Method, StageResults]
 
 
-def _estimate_torque_log(log: PreparedLog, method: Method, *, with_plants: bool) -> _Stage:
-    """Return the conclusions, the method that they are from, and the evidence."""
-    if method is Method.PAPER:
-        paper = _identify_paper_shifts(log)
-        return (
-            _complete(assess_paper_shifts(paper, log.signals, log.drivelines), log),
-            method,
-            StageResults(paper=paper),
-        )
-    likely, gave_up = method is Method.LIKELIHOOD, ""
-    integral_stages = _INTEGRAL.repeat("tolerances", 1 if log.design.sensors else 0)
-    stages = _LIKELIHOOD if likely else integral_stages
-    try:
-        with stages.enter("linear", "linear method"):
-            found, integral = estimate_integral(log.signals, log.drivelines, log.design)
-    except IdentificationError as error:
-        if not likely:
-            raise
-        return _estimate_likelihood_only(log, error, with_plants=with_plants)
-    evidence = StageResults(integral=integral)
-    if likely:
-        try:
-            with stages.enter("likelihood", "likelihood"):
-                from drivetwin.estimation.likelihood.pipeline import estimate_likelihood
+def _estimate(log: PreparedLog, method: Method) -> _Stage:
+    """Return the conclusions, the method that they are from, and the evidence.
 
-                linear = found, integral
-                found, fit = estimate_likelihood(
-                    log.signals, log.drivelines, linear, log.design, with_plants=with_plants
-                )
-            evidence = replace(evidence, likelihood=fit)
-        except IdentificationError as error:
-            method, gave_up = Method.INTEGRAL, error.what
-            evidence = replace(evidence, gave_up=gave_up)
-    if method is Method.INTEGRAL:
-        with integral_stages.enter("tolerances", "tolerances of the sensors"):
-            found = add_tolerances(integral, log.signals, log.drivelines, log.design)
-    found = _complete(found, log)
-    if gave_up:
-        failed = report(Code.LIKELIHOOD_FAILED, why=gave_up)
-        estimates = apply_errors(found.estimates, [failed])
-        found = replace(found, estimates=estimates, findings=(failed, *found.findings))
+    The paper's method gives the values of a log whose likelihood failed. Raises IdentificationError
+    where that cannot be computed either.
+    """
+    if method is Method.PAPER:
+        return _estimate_by_paper(log, StageResults())
+    from drivetwin.estimation.likelihood.pipeline import estimate_likelihood
+
     try:
-        with stages.enter("paper", "paper's method"):
+        with _LIKELIHOOD.enter("likelihood", "likelihood"):
+            found, fit = estimate_likelihood(log.signals, log.drivelines, log.design)
+    except IdentificationError as error:
+        return _replace_failed(log, error)
+    found, evidence = _complete(found, log), StageResults(likelihood=fit)
+    if not log.scale_known:
+        return found, method, evidence
+    try:
+        with _LIKELIHOOD.enter("paper", "paper's method"):
             evidence = replace(evidence, paper=_identify_paper_shifts(log))
     except IdentificationError as error:
         failed = report(Code.PAPER_METHOD_FAILED, why=error.what)
@@ -209,54 +188,33 @@ def _estimate_torque_log(log: PreparedLog, method: Method, *, with_plants: bool)
     return found, method, evidence
 
 
+def _estimate_by_paper(log: PreparedLog, evidence: StageResults) -> _Stage:
+    """Return the conclusions of the paper's method. Raises IdentificationError without any."""
+    paper = _identify_paper_shifts(log)
+    found = _complete(assess_paper_shifts(paper, log.signals, log.drivelines), log)
+    return found, Method.PAPER, replace(evidence, paper=paper)
+
+
+def _replace_failed(log: PreparedLog, error: IdentificationError) -> _Stage:
+    """Return the paper's values, none identified, in place of a failed likelihood.
+
+    Raises `error` for a log that the paper's method cannot carry.
+    """
+    if not log.scale_known:
+        raise error
+    try:
+        found, method, evidence = _estimate_by_paper(log, StageResults(gave_up=error.what))
+    except IdentificationError:
+        raise error from None
+    failed = report(Code.LIKELIHOOD_FAILED, why=error.what)
+    estimates = apply_errors(found.estimates, [failed])
+    return replace(found, estimates=estimates, findings=(failed, *found.findings)), method, evidence
+
+
 def _complete(found: EstimateSet, log: PreparedLog) -> EstimateSet:
     """Return the estimates with μ times gain of every friction curve."""
     couplings = log.drivelines[0].couplings
     return complete_friction(found, {name: one.gain_prior for name, one in couplings.items()})
-
-
-def _estimate_likelihood_only(
-    log: PreparedLog, refusal: IdentificationError, *, with_plants: bool
-) -> _Stage:
-    """Fit the likelihood from a start of its own where the linear method has no equation.
-
-    That is so for gears engaged too briefly, and by the dissipative law for a drive whose torque
-    flows back throughout. Raises the linear method's `refusal` if it does not converge either.
-    """
-    from drivetwin.estimation.likelihood.pipeline import estimate_without_linear
-
-    try:
-        with _LIKELIHOOD.enter("likelihood", "likelihood"):
-            found, fit = estimate_without_linear(
-                log.signals, log.drivelines, log.design, with_plants=with_plants
-            )
-    except IdentificationError:
-        raise refusal from None
-    failed = report(Code.LINEAR_METHOD_FAILED, why=refusal.what)
-    found = replace(found, findings=(failed, *found.findings))
-    return found, Method.LIKELIHOOD, StageResults(likelihood=fit)
-
-
-def _estimate_torqueless_log(
-    log: PreparedLog, method: Method, *, with_plants: bool
-) -> tuple[EstimateSet, StageResults]:
-    """Fit a log without an output torque, which only the likelihood method can do.
-
-    Raises IdentificationError for the other methods.
-    """
-    if method is not Method.LIKELIHOOD:
-        raise IdentificationError(
-            "the log has no output torque: inertias, load, shaft and friction share one unknown "
-            f"scale without it, which the {method} method cannot leave open",
-            "map an output-shaft torque sensor as 'output_torque', or use the likelihood method",
-            Where(file=log.source),
-        )
-    from drivetwin.estimation.likelihood.pipeline import estimate_without_linear
-
-    found, best = estimate_without_linear(
-        log.signals, log.drivelines, log.design, with_plants=with_plants
-    )
-    return found, StageResults(likelihood=best)
 
 
 def _identify_paper_shifts(log: PreparedLog) -> tuple[PaperShift, ...]:
@@ -297,7 +255,7 @@ def _collect_settings(design: DesignData, method: Method) -> dict[str, Any]:
         return ranges
     from drivetwin.estimation.settings import collect_settings
 
-    return collect_settings(method) | ranges
+    return collect_settings() | ranges
 
 
 def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet) -> tuple[str, ...]:
@@ -315,6 +273,8 @@ def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet)
         texts.append("T_c = T_o/i_out in the inertia phase (eq. 16), P0 as on the card")
     else:
         texts.append("sensor noise is white, at the level found in the log")
+    if method is Method.LIKELIHOOD and is_quick():
+        texts.append(ONE_MODEL)
     if design.loss_law == "dissipative":
         texts.append(ALL_BEFORE_LOSS)
     if not design.sensors:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Settings of all stages of a method, as the result records them."""
+"""Settings of all stages of the likelihood method, as the result records them."""
 
 from __future__ import annotations
 
@@ -8,48 +8,31 @@ from typing import Any
 
 from drivetwin.estimation import identification
 from drivetwin.estimation.data import noise, segments, select_shifts
+from drivetwin.estimation.direct import load_balance, momentum_balance
 from drivetwin.estimation.likelihood import coloured_noise, objective, priors
-from drivetwin.estimation.likelihood import pipeline as likelihood
 from drivetwin.estimation.likelihood.data import input_smoothing, shift_record
 from drivetwin.estimation.likelihood.effects import causes, correction, joint_step
 from drivetwin.estimation.likelihood.noise import residual_covariance
-from drivetwin.estimation.likelihood.optimize import (
-    initial_guess,
-    multistart,
-)
-from drivetwin.estimation.linear import (
-    estimates,
-    friction_points,
-    load_balance,
-    momentum_balance,
-    ringdown,
-)
-from drivetwin.estimation.linear import pipeline as integral
+from drivetwin.estimation.likelihood.optimize import initial_guess, multistart
 from drivetwin.estimation.optimize import gauss_newton
 from drivetwin.estimation.result import prior_conflict, verdict
-from drivetwin.estimation.result.method import Method
 
-_LINEAR = (
-    *(noise, select_shifts, segments, momentum_balance, load_balance, ringdown, friction_points),
-    *(integral, gauss_newton, estimates, verdict, prior_conflict),
+_STAGES = (
+    *(noise, select_shifts, segments, momentum_balance, load_balance, initial_guess),
+    *(shift_record, input_smoothing, priors, multistart, gauss_newton, objective),
+    *(residual_covariance, coloured_noise, causes, joint_step, correction),
+    *(verdict, prior_conflict, identification),
 )
-"""Stages of the integral method, with which the likelihood method starts."""
-_LIKELIHOOD = (
-    *(likelihood, shift_record, input_smoothing, priors, initial_guess),
-    *(multistart, objective, residual_covariance, coloured_noise),
-    *(causes, joint_step, correction, identification),
-)
-"""Stages that the likelihood method adds."""
 
 
-def collect_settings(method: Method) -> dict[str, Any]:
-    """Collect the settings of the integral or the likelihood method by stage.
+def collect_settings() -> dict[str, Any]:
+    """Collect the settings of the likelihood method by stage.
 
     The settings of a stage are the constants of its module whose class is named `...Settings`.
     """
     return {
         name.lower(): asdict(value)
-        for stage in (_LINEAR if method is Method.INTEGRAL else _LINEAR + _LIKELIHOOD)
+        for stage in _STAGES
         for name, value in vars(stage).items()
         if type(value).__name__.endswith("Settings")
     }

@@ -274,7 +274,7 @@ def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
     until then stays in the store.
     """
     with Store(request.store, write=True) as store, closing(_make_pool(request, tell)) as pool:
-        scan = Scan(request.rules, request.method, request.time_limit)
+        scan = Scan(request.rules, request.method, quick=request.quick, seconds=request.time_limit)
         return Coordinator(store, pool, request, tell).run(scan, request.sources)
 
 

@@ -19,10 +19,11 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
+from drivetwin.estimation.direct.friction_law import P0, evaluate_stribeck
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import invert_information
+from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.linear.friction_points import P0, evaluate_stribeck
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.estimation.result.prior_conflict import remove_prior
 from drivetwin.estimation.result.verdict import assess, reject_identified
@@ -90,20 +91,13 @@ def _get_posterior(
     """Friction law and P0 (5,) of an element with two covariances: that of log and priors, and
     the one widened by all else."""
     fit = found.evidence.likelihood
-    if fit is not None:
-        wanted = [f"{element}.{key}" for key in (*LAW, "P0")]
-        if not set(wanted) <= set(fit.point.names):
-            return None
-        place = [fit.point.names.index(name) for name in wanted]
-        inverse = invert_information(fit.normal.information)
-        rows = np.ix_(place, place)
-        return fit.mean.values[place], inverse[rows], fit.covariance[rows]
-    for shift in found.evidence.integral:
-        if shift.friction is not None and shift.friction.element == element:
-            size = _LAW_SIZE + 1
-            covariance = shift.friction.fit.covariance[:size, :size]
-            return shift.friction.fit.theta[:size], covariance, covariance
-    return None
+    wanted = [f"{element}.{key}" for key in (*LAW, "P0")]
+    if fit is None or not set(wanted) <= set(fit.point.names):
+        return None
+    place = [fit.point.names.index(name) for name in wanted]
+    inverse = invert_information(fit.normal.information)
+    rows = np.ix_(place, place)
+    return fit.mean.values[place], inverse[rows], fit.covariance[rows]
 
 
 _CARDS = 64
@@ -135,7 +129,8 @@ def identify_log(task: Task) -> Found:
             Where(file=task.path),
         )
     found_shifts = require_shifts(log, card)
-    found = identify(log, card, found_shifts, recipe.method)
+    with quick(recipe.quick):
+        found = identify(log, card, found_shifts, recipe.method)
     twin = build_twin(found, card)
     found = attach_validation(found, twin, log)
     _write_artefacts(task, found, log)

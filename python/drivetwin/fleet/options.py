@@ -15,9 +15,8 @@ class FleetOptions(Request):
     `memory_limit` [bytes]. `retry` selects the quarantined logs.
     """
 
-    method: Method = option(
-        "paper, integral or likelihood.", metavar="METHOD", default=DEFAULT_METHOD
-    )
+    method: Method = option("likelihood or paper.", metavar="METHOD", default=DEFAULT_METHOD)
+    quick: bool = flag("Fit one model to each log, and try no other; for a survey of many logs.")
     workers: int | None = option("Processes on this machine; default: one per core.", minimum=1)
     scheduler: str | None = option("Work on a Dask cluster, tcp://host:port.", metavar="ADDRESS")
     time_limit: float = option("Time limit of one log.", unit=SECOND, minimum=0.1, default=600.0)

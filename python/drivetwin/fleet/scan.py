@@ -75,12 +75,14 @@ class _Content:
 class Scan:
     """Looks at the files of a fleet by its rules, with one method; see `scanned`."""
 
-    def __init__(self, rules: RulesFile, method: Method, seconds: float = math.inf) -> None:
+    def __init__(
+        self, rules: RulesFile, method: Method, *, quick: bool = False, seconds: float = math.inf
+    ) -> None:
         """Scan by `rules`; reading one file may take `seconds`."""
         self._rules = rules
         self._seconds = seconds
         self._stop = threading.Event()
-        self._method = method
+        self._method, self._quick = method, quick
         self._recipe = lru_cache(self._read_recipe)
         self._is_bus = lru_cache(is_ratio_card)
 
@@ -182,6 +184,7 @@ class Scan:
             vehicle=vehicle,
             channels=channels,
             method=self._method,
+            quick=self._quick,
             inputs=compute_input_hashes(vehicle, channels),
             version=get_program_version(),
             means=self._rules.list_channel_means(),

@@ -40,6 +40,7 @@ class TaskSpec:
     vehicle: str
     channels: str | None
     method: Method
+    quick: bool
     inputs: tuple[tuple[str, str], ...]
     version: str
     means: tuple[tuple[str, str], ...] = ()

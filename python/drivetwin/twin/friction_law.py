@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, propagate_variance
-from drivetwin.estimation.linear.friction_points import build_law_derivatives
+from drivetwin.estimation.direct.friction_law import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PARTNER_REST_STD

@@ -5,9 +5,7 @@ The measured inputs drive the identified model. In each phase its error must lie
 predicted from noise, parameters and effects. Where it does not, no value is identified, whatever
 its interval.
 
-Starting values are those of the linear method after a failed likelihood. Their intervals contain
-noise alone. They hold only where the simulation with them explains the log. Suspects are the
-entries of the card that are most likely wrong where a model fails its gate.
+Suspects are the entries of the card that are most likely wrong where a model fails its gate.
 """
 
 from __future__ import annotations
@@ -17,10 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA, ShiftSignals
+from drivetwin.estimation.data.shift_data import PLAUSIBLE_ETA
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.cause import EXPLAINED, PredictedSpread
-from drivetwin.estimation.result.estimate import Estimate, Verdict
+from drivetwin.estimation.result.cause import PredictedSpread
+from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.estimation.result.verdict import USUAL_FRICTION, apply_errors
@@ -31,7 +29,6 @@ from drivetwin.findings import (
     Row,
     Severity,
     Value,
-    explain,
     make_row,
     report,
 )
@@ -75,7 +72,6 @@ def assess_model(found: Identification) -> Identification:
     have: its card contradicts it. A model that fails keeps its values, none of them identified, and
     a finding names the entries of the card that are most likely wrong.
     """
-    found = withhold_starting_values(found)
     noisy, missing = _check_fit(found)
     impossible, implausible = _check_friction(found)
     failures = [*missing, *_check_runs(found), *_check_spread(found), *_check_efficiency(found)]
@@ -235,57 +231,6 @@ def _check_efficiency(found: Identification) -> Iterator[Finding]:
     eta = found.estimates.get("eta")
     if eta is not None and eta.value is not None and eta.value < GATE.least_efficiency:
         yield report(Code.EFFICIENCY_IMPLAUSIBLE, value=eta.value)
-
-
-def withhold_starting_values(found: Identification) -> Identification:
-    """Withhold the values of an identification whose likelihood failed, with their friction.
-
-    They are kept where the simulation with them leaves the noise of every compared signal and no
-    more. Values of the card stay.
-    """
-    if not found.evidence.gave_up:
-        return found
-    chi2, channel = _find_largest_power(found)
-    if chi2 <= EXPLAINED:
-        return found
-    reason = explain(Code.STARTING_VALUE_UNCHECKED)
-    if channel:
-        reason = explain(Code.STARTING_VALUE, chi2=chi2, channel=channel)
-    estimates = {name: _withhold(one, reason) for name, one in found.estimates.items()}
-    return replace(found, estimates=estimates, friction={}, joint=None)
-
-
-def _withhold(one: Estimate, reason: str) -> Estimate:
-    if one.verdict not in (Verdict.IDENTIFIED, Verdict.WEAK):
-        return one
-    return Estimate(one.id, None, None, Verdict.NOT_IDENTIFIABLE, one.method, reason=reason)
-
-
-def _find_largest_power(found: Identification) -> tuple[float, str]:
-    """Find the largest residual power of a compared signal over its noise, and the signal; infinite
-    without a simulation."""
-    worst = float("inf"), ""
-    powers = [
-        (power, name.replace("_", " "))
-        for one, signals in zip(found.evidence.validation, found.evidence.signals, strict=False)
-        for name, power in _compute_powers(one, signals).items()
-    ]
-    return max(powers, default=worst)
-
-
-def _compute_powers(one: Validation, signals: ShiftSignals) -> dict[str, float]:
-    """Compute the residual power of each compared signal over the power of its noise."""
-    noise = {
-        "output_torque": signals.output_torque.sigma,
-        "input_speed": signals.engine_speed.sigma / one.model.i_in,
-        "output_speed": signals.output_speed.sigma,
-    }
-    return {
-        name: float(np.mean((trace.measured - trace.simulated) ** 2))
-        / max(noise[name], 1e-300) ** 2
-        for name, trace in one.traces.items()
-        if trace.time.size
-    }
 
 
 LEAST_SIZE = 3.0

@@ -10,6 +10,7 @@ from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.analysis.experiment_design import rank_for_weak
 from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
 from drivetwin.report.bus_outcome import BusOutcome, identify_vehicle
 from drivetwin.twin.twin import Twin
@@ -26,11 +27,15 @@ _STEPS = {
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Input of an identification: `card` with the fixed values, shifts with the manual edits."""
+    """Input of an identification: `card` with the fixed values, shifts with the manual edits.
+
+    With `is_quick` one model is fitted, as in `quick`.
+    """
 
     sources: Sequence[Source]
     card: VehicleCard
     methods: Sequence[Method]
+    is_quick: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +79,7 @@ def identify_all(emit: Emit, task: Task) -> None:
 def _run_method(task: Task, method: Method) -> Outcome | Refusal:
     """Run one method; return its outcome, or the reason of its failure."""
     try:
-        with _STEPS[method].enter("identification"):
+        with _STEPS[method].enter("identification"), quick(task.is_quick):
             made = identify_together(task.sources, task.card, method)
         with _STEPS[method].enter("experiments", "comparing experiments"):
             return Outcome(method, made.twins, rank_for_weak(made.found))

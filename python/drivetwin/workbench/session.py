@@ -239,9 +239,10 @@ class Session:
         with self.lock:
             self.work = self.work.set_lock(parameter_id, lock)
 
-    def identify(self, methods: Sequence[Method]) -> None:
+    def identify(self, methods: Sequence[Method], *, is_quick: bool = False) -> None:
         """Start the identification in a separate process; bus logs have one method.
 
+        With `is_quick` one model is fitted, as in `quick`.
         Raises InputError on failure.
         """
         with self.lock:
@@ -253,7 +254,7 @@ class Session:
                 self._set(work.drop_results())
                 self.job = jobs.start(identify_bus_logs, bus)
                 return
-            task = Task(work.build_sources(), work.apply_locks_to_card(), tuple(methods))
+            task = Task(work.build_sources(), work.apply_locks_to_card(), tuple(methods), is_quick)
             self._set(work.drop_results())
             self.job = jobs.start(identify_all, task)
 

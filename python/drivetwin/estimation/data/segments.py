@@ -48,8 +48,6 @@ class Segment:
     `ratio` is i_g or i_h; `tied` is true if the gear is locked, so ω_e = ratio·ω_out.
     """
 
-    name: str
-    span: Span
     ratio: float
     tied: bool
     windows: Windows
@@ -146,7 +144,7 @@ def find_segments(
                 windows = _select_driving_windows(signals.output_torque, windows)
                 backwards = backwards or not windows.count
             if windows.count:
-                found.append(Segment(name, part, ratio, tied, windows))
+                found.append(Segment(ratio, tied, windows))
     if backwards and not found:
         raise IdentificationError(
             "nowhere does torque flow from the engine to the wheels throughout, which the momentum "

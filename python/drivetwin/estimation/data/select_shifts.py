@@ -93,17 +93,6 @@ class VehicleBalance:
         return 0.5 * self.windows.width
 
     @property
-    def mean_torque(self) -> FloatArray:
-        """T_o in each window (m,) [N m]."""
-        return np.asarray((self.psi.matrix @ self.torque.values) / self.area)
-
-    @property
-    def acceleration(self) -> FloatArray:
-        """ω_w' in each window (m,) [rad/s^2]."""
-        slope = self.kernels.slope.matrix @ self.speed.values
-        return np.asarray(slope * self.ratio / self.area)
-
-    @property
     def square(self) -> FloatArray:
         """Mean of ω_w² in each window (m,) [rad²/s²]. Its noise averages out; that of ω_w at one
         instant, squared, would outweigh all else."""

@@ -22,10 +22,7 @@ WEIGHTING = 4.0
 MAX_REFIT_WORK = 600.0
 """Work of a refit from a minimum: an element in the plant takes 3 to 6 expansions of about 30
 passes, another minimum or sampling mode about 100 passes [passes]."""
-REMEDY = (
-    "check ratios, clutch gains and P0 on the card against the log; where it has an output torque, "
-    "the integral method gives values without a model of the shift"
-)
+REMEDY = "check ratios, clutch gains and P0 on the card against the log"
 """Remedy for the user if no search ends at a plausible minimum."""
 
 

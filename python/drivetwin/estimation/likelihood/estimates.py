@@ -17,6 +17,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.direct.load_balance import AERO, report_different_loads
 from drivetwin.estimation.likelihood.diagnostics.identifiability import (
     find_at_bounds,
     find_null_directions,
@@ -62,10 +63,9 @@ from drivetwin.estimation.likelihood.uncertainty.torque_scale import (
     find_scale,
     scale_covariance,
 )
-from drivetwin.estimation.linear.load_balance import AERO, report_different_loads
 from drivetwin.estimation.optimize.objective import ParameterVector, find_acting, join_columns
 from drivetwin.estimation.result.cause import EXPLAINED, WRONG_ENTRY, PredictedSpread
-from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict
+from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
     JointCovariance,
@@ -159,21 +159,19 @@ def build_estimates(
     fit: LikelihoodFit,
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[KnownDriveline],
-    linear: Mapping[str, FrictionCurve],
     priors: EffectPriors,
 ) -> EstimateSet:
     """Judge every parameter.
 
-    `linear` are the friction curves of the linear method by element, `priors` the card's
-    statements on effects and sensors. Values and intervals allow for all effects that the model
-    leaves out; where these are too large for that, no value is identified.
+    `priors` are the card's statements on effects and sensors. Values and intervals allow for all
+    effects that the model leaves out; where these are too large for that, no value is identified.
     """
     correction = correct_fit(fit, priors)
     corrected = correction or keep_fit(fit)
     cause = find_cause(corrected, fit)
     predicted = corrected
     corrected = widen_by_rivals(corrected, fit, cause)
-    slips = find_reference_slips(fit, linear)
+    slips = find_reference_slips(fit)
     own = _fit_parameters(fit, corrected, signals, drivelines, slips)
     sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
     if sensors is not None and sensors.step.chi2 <= EXPLAINED:
@@ -183,7 +181,7 @@ def build_estimates(
             corrected, own, predicted = sensors, plain, sensors
             cause = find_cause(corrected, fit)
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
-    curves = build_friction_curves(fit, linear, corrected)
+    curves = build_friction_curves(fit, corrected)
     ids = fitted.ids
     withdrawn = find_unreliable(corrected, ids, matrix, std)
     subjects = {one.subject for one in withdrawn}

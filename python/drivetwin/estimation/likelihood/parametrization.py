@@ -27,8 +27,8 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
-from drivetwin.estimation.linear.friction_points import evaluate_stribeck
-from drivetwin.estimation.linear.load_balance import AERO
+from drivetwin.estimation.direct.friction_law import evaluate_stribeck
+from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.simulation.added_elements import (

@@ -29,6 +29,9 @@ from drivetwin.estimation.data.shift_data import (
     ShiftElementKinematics,
     ShiftSignals,
 )
+from drivetwin.estimation.direct.friction_law import LAW_PRIOR
+from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute_mean_speed
+from drivetwin.estimation.direct.momentum_balance import DELAY
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.shift_record import RECORD, build_record
 from drivetwin.estimation.likelihood.parametrization import (
@@ -42,9 +45,6 @@ from drivetwin.estimation.likelihood.parametrization import (
     map_log_names,
 )
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
-from drivetwin.estimation.linear.friction_points import LAW_PRIOR
-from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE, compute_mean_speed
-from drivetwin.estimation.linear.momentum_balance import DELAY
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio

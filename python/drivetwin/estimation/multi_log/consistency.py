@@ -25,7 +25,8 @@ from scipy.special import chdtrc
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import ShiftSignals
-from drivetwin.estimation.identification import Consistency, Identification, LogPull
+from drivetwin.estimation.direct.friction_law import evaluate_stribeck
+from drivetwin.estimation.identification import Consistency, LogPull
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
@@ -37,7 +38,6 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
 )
-from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
@@ -80,31 +80,6 @@ def _widen(curve: FrictionCurve, move: LogPull | None) -> FrictionCurve:
     half = 0.5 * abs(move.z) * (exact.mu_hi - exact.mu_lo)
     wide = replace(exact, mu_lo=curve.mu - half, mu_hi=curve.mu + half)
     return wide if curve.gain is None else wide.add_gain_spread(curve.gain)
-
-
-def pool_curves(alone: Sequence[Identification]) -> dict[str, FrictionCurve]:
-    """Merge by element the curves of all logs over the slips that any log covers."""
-    found: dict[str, list[FrictionCurve]] = {}
-    for one in alone:
-        for name, curve in one.friction.items():
-            found.setdefault(name, []).append(curve)
-    return {name: _pool(curves) for name, curves in found.items()}
-
-
-def _pool(curves: Sequence[FrictionCurve]) -> FrictionCurve:
-    """Extend the first curve over the slips of all; its μ is filled in by the common fit."""
-    ends = np.concatenate([curve.slip[[0, -1]] for curve in curves])
-    slip = np.linspace(ends.min(), ends.max(), curves[0].slip.size)
-    nothing = np.zeros_like(slip)
-    return replace(
-        curves[0],
-        slip=slip,
-        mu=nothing,
-        mu_lo=nothing,
-        mu_hi=nothing,
-        points_slip=np.concatenate([curve.points_slip for curve in curves]),
-        points_mu=np.concatenate([curve.points_mu for curve in curves]),
-    )
 
 
 LEAST_SHARE = 0.02

@@ -25,6 +25,7 @@ from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import PreparedLog
+from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.identification import (
     CONSISTENCY,
     Identification,
@@ -37,6 +38,7 @@ from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import admit_excluded
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
+from drivetwin.estimation.likelihood.mechanism import Mechanism, disable
 from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START
 from drivetwin.estimation.likelihood.parametrization import (
     LOG_SPECIFIC,
@@ -44,11 +46,9 @@ from drivetwin.estimation.likelihood.parametrization import (
     map_log_names,
 )
 from drivetwin.estimation.likelihood.selection.select_model import select_model
-from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.multi_log.consistency import (
     apply_consistency,
     check_consistency,
-    pool_curves,
 )
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.method import Method
@@ -89,7 +89,7 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
             ) from fault
     with stages.enter("conclusions", "intervals"):
         priors, contradicted = admit_excluded(fit, priors)
-        joint = build_estimates(fit, signals, drivelines, pool_curves(alone), priors)
+        joint = build_estimates(fit, signals, drivelines, priors)
         tested = check_consistency(fit, signals, joint.friction)
     shares = tuple(
         _build_log_share(k, log, one, fit)
@@ -106,7 +106,6 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
     evidence = StageResults(
         signals=tuple(signals),
         paper=tuple(one for each in alone for one in each.evidence.paper),
-        integral=tuple(one for each in alone for one in each.evidence.integral),
         likelihood=fit,
         loads=joint.loads,
         cause=joint.cause,
@@ -131,7 +130,8 @@ def _identify_single(log: PreparedLog) -> Identification:
 
     Raises IdentificationError if the likelihood does not carry it.
     """
-    found = identify(log, with_plants=False)
+    with disable([Mechanism.PLANTS]):
+        found = identify(log)
     if found.method is not Method.LIKELIHOOD:
         raise IdentificationError(
             f"the likelihood does not explain this log by itself: {found.evidence.gave_up}",

@@ -22,13 +22,13 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftData
+from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
 from drivetwin.estimation.likelihood.optimize.multistart import STAGED_START
 from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, START, map_log_names
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
-from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior

@@ -17,24 +17,26 @@ from itertools import product
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
+from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
-from drivetwin.estimation.linear.friction_points import compute_mean_slip
-from drivetwin.estimation.linear.ringdown import (
+from drivetwin.estimation.direct.ringdown import (
     RING_DOWN,
     RingDown,
-    _refuse,
-    _select_ring_samples,
     compute_shaft_parameters,
+    refuse_ringdown,
+    select_ring_samples,
+)
+from drivetwin.estimation.direct.window_means import (
+    compute_window_edges,
+    compute_window_means,
+    drop_nan_rows,
 )
 from drivetwin.estimation.paper.wlse import (
     GridFit,
     GridRow,
     Weighting,
     compute_central_difference,
-    compute_window_edges,
-    compute_window_means,
-    drop_nan_rows,
     fit_weighted_inertia,
 )
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
@@ -74,7 +76,7 @@ def estimate_paper_friction(
     torque = compute_window_means(signals.output_torque, edges)
     pressure = compute_window_means(signals.pressures[element.name], edges)
     time, torque, pressure = drop_nan_rows(0.5 * (edges[1:] + edges[:-1]), torque, pressure)
-    slip = np.abs(compute_mean_slip(signals, driveline, time))
+    slip = np.abs(_compute_mean_slip(signals, driveline, time))
     turns = np.flatnonzero(np.diff(np.sign(np.diff(torque))) != 0) + 1
     picked = turns if turns.size >= 8 else np.arange(time.size)
     capacity = element.gain * (pressure[picked] - element.P0.value)
@@ -95,6 +97,19 @@ def estimate_paper_friction(
     nothing = np.full(points, np.nan)
     curve = FrictionCurve(grid, smooth, nothing, nothing, s, m, fit_stribeck_law(s, m), "paper")
     return PaperFriction(element.name, curve, time[picked])
+
+
+def _compute_mean_slip(
+    signals: ShiftSignals, driveline: KnownDriveline, time: FloatArray
+) -> FloatArray:
+    """Slip of the on-coming element (eq. 15) [rad/s] at `time` (n,), over 11 samples' mean."""
+
+    def smooth(signal: MeasuredSignal) -> FloatArray:
+        return np.interp(time, signal.time, compute_moving_mean(signal.values, 11))
+
+    element = driveline.oncoming
+    engine, output = smooth(signals.engine_speed), smooth(signals.output_speed)
+    return element.a * engine - element.b * output
 
 
 def fit_stribeck_law(slip: FloatArray, mu: FloatArray) -> Stribeck:
@@ -139,7 +154,7 @@ def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -
     T_o is averaged over 10 ms windows; half the difference of neighbouring extremes falls by
     exp(-σ·T/2). Extremes count while they exceed four times the noise of an average.
     """
-    part = _select_ring_samples(torque, lockup, end, RING_DOWN.latest_start)
+    part = select_ring_samples(torque, lockup, end, RING_DOWN.latest_start)
     edges = compute_window_edges((part.time[0], part.time[-1]))
     mean, centre = compute_window_means(part, edges), 0.5 * (edges[1:] + edges[:-1])
     count = max(part.time.size / mean.size, 1.0)
@@ -151,7 +166,7 @@ def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -
             break
         picked.append(int(k))
     if len(picked) < 4:
-        raise _refuse(f"only {len(picked)} extremes stand out of the noise")
+        raise refuse_ringdown(f"only {len(picked)} extremes stand out of the noise")
     at = np.asarray(picked)
     bend = mean[at - 1] - 2.0 * mean[at] + mean[at + 1]
     shift = 0.5 * (mean[at - 1] - mean[at + 1]) / bend
@@ -162,10 +177,8 @@ def estimate_paper_ringdown(torque: MeasuredSignal, lockup: float, end: float) -
     decrement = -float(np.polyfit(order[:-1], swing, 1)[0])
     rate, omega = decrement / half_period, np.pi / half_period
     if not (rate > 0.0 and RING_DOWN.band[0] < omega / (2 * np.pi) < RING_DOWN.band[1]):
-        raise _refuse(f"decay rate {rate:.3g} 1/s at {omega / (2 * np.pi):.3g} Hz")
-    return RingDown(
-        rate, omega, np.zeros((2, 2)), part.time, part.values, part.values, instants, mean[at]
-    )
+        raise refuse_ringdown(f"decay rate {rate:.3g} 1/s at {omega / (2 * np.pi):.3g} Hz")
+    return RingDown(rate, omega, part.time, part.values, instants, mean[at])
 
 
 @dataclass(frozen=True)
@@ -386,7 +399,7 @@ def assess_paper_shifts(
     for driveline in drivelines:
         if driveline.J_out is not None:
             estimates["J_out"] = from_prior("J_out", driveline.J_out, Code.PAPER_CARD_VALUE)
-    estimates |= collect_fill_pressures(drivelines, Code.PAPER_CARD_VALUE)
+    estimates |= collect_fill_pressures(drivelines)
     friction = {s.friction.element: s.friction.curve for s in shifts if s.friction is not None}
     doubts = dict.fromkeys(
         one for shift in shifts for found in shift.doubts.values() for one in found

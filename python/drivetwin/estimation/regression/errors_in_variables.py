@@ -94,15 +94,12 @@ class Prior:
 class Fit:
     """Estimate `theta` (p,), `covariance` (p, p) from noise and priors, and its residuals.
 
-    `residual` (m,) and `residual_std` (m,) at the estimate; `chi2` is Q per degree of freedom
-    without the prior; `information` (p, p) is that of the data alone.
+    `residual` (m,) at the estimate; `chi2` is Q per degree of freedom without the prior.
     """
 
     theta: FloatArray
     covariance: FloatArray
-    information: FloatArray
     residual: FloatArray
-    residual_std: FloatArray
     q: float
     chi2: float
 
@@ -164,7 +161,6 @@ class _Evaluation:
     gradient: FloatArray
     regressors: FloatArray
     factor: BandedCholesky
-    variance: FloatArray
 
     @property
     def information(self) -> FloatArray:
@@ -242,7 +238,6 @@ def _evaluate(terms: Sequence[Term], size: int) -> _Evaluation:
     for t in terms:
         residual += t.factor * (t.quadrature.matrix @ t.values)
     cov = _compute_residual_covariance(terms)
-    variance = np.diag(cov).copy()
     factor = BandedCholesky.from_covariance(cov)
     multiplier = factor.solve(residual)
     columns = np.zeros((count, size))
@@ -253,7 +248,7 @@ def _evaluate(terms: Sequence[Term], size: int) -> _Evaluation:
         for index, (slope, quadrature) in t.slopes.items():
             columns[:, index] += slope * (quadrature.matrix @ clean)
     gradient = columns.T @ multiplier
-    return _Evaluation(residual, float(residual @ multiplier), gradient, columns, factor, variance)
+    return _Evaluation(residual, float(residual @ multiplier), gradient, columns, factor)
 
 
 def _estimate_spurious_information(
@@ -307,9 +302,7 @@ def solve(
     return Fit(
         theta,
         covariance,
-        information,
         point.residual,
-        np.sqrt(point.variance),
         point.q,
         chi2,
     )

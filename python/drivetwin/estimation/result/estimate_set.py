@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Estimates of one identification and their joint distribution, shared by all methods."""
+"""Estimates of one identification and their joint distribution, shared by both methods."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import groupby
 
 import numpy as np
@@ -99,10 +99,3 @@ def check_excitation(signals: Sequence[ShiftSignals]) -> dict[str, Finding]:
             notes |= {"eta": note}
             notes |= {f"J_prime_{g}": note for g in (s.shift.start_gear, s.shift.end_gear)}
     return notes
-
-
-def add_systematic_band(curve: FrictionCurve, std: FloatArray) -> FrictionCurve:
-    """`curve` with its band widened by the sensors' systematic errors `std` (n,) of μ."""
-    noise = (curve.mu_hi - curve.mu_lo) / (2.0 * Z95)
-    half = Z95 * np.hypot(noise, std)
-    return replace(curve, mu_lo=curve.mu - half, mu_hi=curve.mu + half)

@@ -24,7 +24,6 @@ class Method(StrEnum):
     """Estimator family."""
 
     PAPER = "paper"
-    INTEGRAL = "integral"
     LIKELIHOOD = "likelihood"
 
 

@@ -53,38 +53,6 @@ class PriorSettings:
 PRIOR = PriorSettings()
 
 
-def add_priors(
-    ids: Sequence[str],
-    values: FloatArray,
-    covariance: FloatArray,
-    known: Mapping[str, PriorValue],
-) -> tuple[FloatArray, FloatArray, tuple[Finding, ...]]:
-    """Update values (q,) and covariance (q, q) with the known values; return findings too.
-
-    A finding is returned for each exactly known value that the log contradicts; prior_conflict.py
-    checks the others.
-    Known values of parameters that are not among `ids` change nothing.
-    """
-    values, covariance = values.copy(), covariance.copy()
-    found: list[Finding] = []
-    for name, prior in known.items():
-        if name not in ids:
-            continue
-        k = ids.index(name)
-        column, spread = covariance[:, k].copy(), covariance[k, k] + prior.std**2
-        if spread <= 0.0:
-            continue
-        miss = prior.value - values[k]
-        if prior.std == 0.0 and abs(miss) > PRIOR.contradiction * np.sqrt(spread):
-            unit = get_parameter_spec(name).unit
-            card, log = Number(prior.value, unit), Number(float(values[k]), unit)
-            found.append(report(Code.FIXED_VALUE_CONTRADICTED, name, card=card, log=log))
-        values = values + column * (miss / spread)
-        covariance -= np.outer(column, column) / spread
-        covariance[np.diag_indices_from(covariance)] = np.maximum(np.diag(covariance), 0.0)
-    return values, covariance, tuple(found)
-
-
 def remove_prior(
     values: FloatArray,
     covariance: FloatArray,
@@ -269,7 +237,7 @@ class FittedParameters:
     `covariance` (q, q) is that of log and priors, before anything widens it. `systematic` are the
     standard deviations from sensor tolerances and effects by id, `notes` findings by id. `method`
     names the estimator, `prior_method` that of parameters whose design value took part. `total`
-    (q, q) is the covariance with all that widens it; None where only `systematic` does.
+    (q, q) is the covariance with all that widens it.
     """
 
     ids: tuple[str, ...]
@@ -281,7 +249,7 @@ class FittedParameters:
     notes: Mapping[str, Finding]
     method: str
     prior_method: str
-    total: FloatArray | None = None
+    total: FloatArray
 
     @cached_property
     def priors(self) -> dict[str, PriorValue]:
@@ -292,11 +260,7 @@ class FittedParameters:
     @cached_property
     def conflicts(self) -> tuple[Contradiction, ...]:
         """Design values that the log contradicts, by all that is uncertain."""
-        total = self.total
-        if total is None:
-            errors = [self.systematic.get(name, 0.0) for name in self.ids]
-            total = self.covariance + np.diag(np.square(errors))
-        return find_contradictions(self.ids, self.values, self.covariance, self.priors, total)
+        return find_contradictions(self.ids, self.values, self.covariance, self.priors, self.total)
 
     def assess(self) -> dict[str, Estimate]:
         """Return the estimates by id with the verdict of their intervals."""
@@ -326,8 +290,8 @@ class FittedParameters:
         return assess_with_prior(computed, prior, self.prior_method, systematic, note)
 
 
-def collect_fill_pressures(drivelines: Sequence[KnownDriveline], code: Code) -> dict[str, Estimate]:
-    """Return the card's P0 of the elements of all shifts, with the reason `code`."""
+def collect_fill_pressures(drivelines: Sequence[KnownDriveline]) -> dict[str, Estimate]:
+    """Return the card's P0 of the elements of all shifts."""
     elements = (element for one in drivelines for element in (one.offgoing, one.oncoming))
     fills = {f"P0.{element.name}": element.P0 for element in elements}
-    return {name: from_prior(name, prior, code) for name, prior in fills.items()}
+    return {name: from_prior(name, prior, Code.PAPER_CARD_VALUE) for name, prior in fills.items()}

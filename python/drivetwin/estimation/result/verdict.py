@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, Verdict
@@ -195,14 +194,13 @@ def from_prior(
     prior: PriorValue,
     code: Code = Code.FIXED_BY_CARD,
     std_systematic: float | None = None,
-    **values: Number,
 ) -> Estimate:
     """Return the estimate of a value that the card states and the log adds little to.
 
     The part that the log adds is as wrong as its sensors: `std_systematic` if their tolerances are
     stated.
     """
-    value, std, reason = prior.value, prior.std, explain(code, **values)
+    value, std, reason = prior.value, prior.std, explain(code)
     return Estimate(parameter_id, value, std, Verdict.DESIGN, "card", std_systematic, reason)
 
 
@@ -251,28 +249,6 @@ def apply_errors(
 def join_reasons(*reasons: str) -> str:
     """Join the reasons of a verdict, sentence after sentence."""
     return " ".join(part for part in reasons if part)
-
-
-def propagate(
-    function: Callable[[FloatArray], FloatArray], mean: FloatArray, covariance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Values (q,) of `function` at `mean` (p,) and their covariance (q, q), to first order.
-
-    Derivatives are central differences over a hundredth of a standard deviation.
-    """
-    std = np.sqrt(np.diag(covariance))
-    columns = []
-    for k, step in enumerate(0.01 * std):
-        shift = np.zeros_like(mean)
-        shift[k] = max(step, 1e-9 * abs(mean[k]), 1e-300)
-        columns.append((function(mean + shift) - function(mean - shift)) / (2.0 * shift[k]))
-    slopes = np.column_stack(columns)
-    return function(mean), slopes @ covariance @ slopes.T
-
-
-def build_block_covariance(*blocks: FloatArray) -> FloatArray:
-    """Covariance of estimates whose errors are independent between the blocks."""
-    return np.asarray(block_diag(*blocks), dtype=float)
 
 
 def compute_covariance_root(covariance: FloatArray) -> FloatArray:

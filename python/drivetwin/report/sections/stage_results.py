@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Each estimator's evidence: what its numbers rest on, stage by stage."""
+"""Evidence of the paper's method, stage by stage."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
 
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.linear.pipeline import IntegralShift
 from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.paper.wlse import GridFit
 from drivetwin.estimation.result.method import Method
@@ -25,8 +23,6 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figures.stage_results import (
     WlseLabels,
-    plot_load,
-    plot_momentum,
     plot_ringdown,
     plot_wlse,
 )
@@ -46,136 +42,71 @@ LOAD_LABELS = WlseLabels(
     torque="T_o − T_v/i_f [Nm]",
     inertia="J3",
 )
-_Kind = TypeVar("_Kind")
 
 
 @dataclass(frozen=True)
-class _Stages(Generic[_Kind]):
-    """One method's stages on one shift; `by` names the method and, of several shifts, which."""
+class _Stages:
+    """The paper's stages on one shift; `by` names the method and, of several shifts, which."""
 
     by: str
-    stages: _Kind
-
-
-_AnyStages = _Stages[IntegralShift] | _Stages[PaperShift]
+    stages: PaperShift
 
 
 def build_stage_sections(found: Identification) -> list[Section]:
-    """Evidence by question: that of the method of the result, then collapsed that of the others.
+    """Evidence of the paper's method by question, collapsed beside the likelihood's result.
 
     The questions are inertia and efficiency, load, and output shaft.
     """
-    integral = _collect_stages(found, found.evidence.integral, "integral method")
-    paper = _collect_stages(found, found.evidence.paper, "the paper's method")
-    by_likelihood = found.evidence.likelihood is not None
-    by_paper = not by_likelihood and found.method is Method.PAPER
-    by_integral = not by_likelihood and not by_paper
-    others = _build_sections(found, [] if by_integral else integral, [] if by_paper else paper)
+    sections = _build_sections(_collect_stages(found))
+    if found.method is Method.PAPER:
+        return sections
     return [
-        *_build_sections(found, integral if by_integral else [], paper if by_paper else []),
-        *(
-            replace(
-                one,
-                anchor=f"appendix-{one.anchor}",
-                title=f"Appendix: {one.title[0].lower()}{one.title[1:]}",
-                intro=f"Evidence of the other methods, for comparison. {one.intro}",
-                collapsed=True,
-            )
-            for one in others
-        ),
+        replace(
+            one,
+            anchor=f"appendix-{one.anchor}",
+            title=f"Appendix: {one.title[0].lower()}{one.title[1:]}",
+            intro=f"Evidence of the paper's method, for comparison. {one.intro}",
+            collapsed=True,
+        )
+        for one in sections
     ]
 
 
-def _build_sections(
-    found: Identification,
-    integral: Sequence[_Stages[IntegralShift]],
-    paper: Sequence[_Stages[PaperShift]],
-) -> list[Section]:
+def _build_sections(paper: Sequence[_Stages]) -> list[Section]:
     return [
         Section(
             "inertia",
             "Inertia and efficiency",
             "Eq. 10: η·T_e − T_o/i = J′·ω_e′. Points on the line mean that torque and acceleration "
             "agree with one η and one J′.",
-            [
-                *_build_momentum_blocks(integral),
-                *(
-                    b
-                    for one in paper
-                    for b in _build_grid_blocks(one, "inertia", "eta", INERTIA_LABELS)
-                ),
-            ],
+            [b for one in paper for b in _build_grid_blocks(one, "inertia", "eta", INERTIA_LABELS)],
         ),
         Section(
             "load",
             "Load and vehicle inertia",
             "Eq. 11: T_o − T_v/i_f = (J3/i_f)·ω_w′, J3 being J_vehicle.",
-            [
-                *_build_load_blocks(found, integral),
-                *(
-                    b
-                    for one in paper
-                    for b in _build_grid_blocks(one, "load", "J_vehicle", LOAD_LABELS)
-                ),
-            ],
+            [b for one in paper for b in _build_grid_blocks(one, "load", "J_vehicle", LOAD_LABELS)],
         ),
         Section(
             "shaft",
             "Output shaft from the lock-up oscillation",
             "After lock-up the inertias on both sides of the output shaft swing against each "
             "other; frequency and decay give stiffness and damping (eqs. 12–14).",
-            [
-                *_build_ring_blocks([*integral, *paper]),
-                *_list_refusals([*integral, *paper], "shaft"),
-            ],
+            [*_build_ring_blocks(paper), *_list_refusals(paper, "shaft")],
         ),
     ]
 
 
-def _collect_stages(
-    found: Identification, stages: Sequence[_Kind], method: str
-) -> list[_Stages[_Kind]]:
-    """Collect the stage results of one method, with the shift names if there are several."""
-    names = [f"Shift {name}, {method}" for name in make_shift_labels(found.shifts)]
+def _collect_stages(found: Identification) -> list[_Stages]:
+    """Collect the stages of the paper's method, with the shift names if there are several."""
+    method, stages = "The paper's method", found.evidence.paper
+    names = [f"Shift {name}, the paper's method" for name in make_shift_labels(found.shifts)]
     if len(stages) < 2 or len(stages) != len(names):
-        names = [method[0].upper() + method[1:]] * len(stages)
+        names = [method] * len(stages)
     return [_Stages(name, one) for name, one in zip(names, stages, strict=True)]
 
 
-def _build_momentum_blocks(shifts: Iterable[_Stages[IntegralShift]]) -> list[Block]:
-    return [
-        FigureBlock(
-            plot_momentum(one.stages.momentum),
-            f"{one.by}, momentum form: each point is a window weighted by a smooth kernel, so "
-            "no speed is differentiated. Right: misfit over the assumed delay of the engine "
-            "torque." + _note_missing_delay(one.stages),
-        )
-        for one in shifts
-    ]
-
-
-def _note_missing_delay(shift: IntegralShift) -> str:
-    why = shift.refusals.get("te_delay")
-    return f" Here {why}; the minimum is not significant, and no delay is assumed." if why else ""
-
-
-def _build_load_blocks(
-    found: Identification, shifts: Iterable[_Stages[IntegralShift]]
-) -> list[Block]:
-    validations = found.evidence.validation
-    final_drive = validations[0].model.i_f if validations else None
-    return [
-        FigureBlock(
-            plot_load(one.stages.load, final_drive),
-            f"{one.by}, momentum form: one point per window.",
-        )
-        for one in shifts
-    ]
-
-
-def _build_grid_blocks(
-    one: _Stages[PaperShift], stage: str, parameter: str, labels: WlseLabels
-) -> list[Block]:
+def _build_grid_blocks(one: _Stages, stage: str, parameter: str, labels: WlseLabels) -> list[Block]:
     """Build figure and table of a grid search, with any doubt about it between the two."""
     fit: GridFit = getattr(one.stages, stage)
     doubt = render(one.stages.doubts.get(parameter, ()))
@@ -208,23 +139,21 @@ def build_grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -
     return make_table(caption, columns, rows)
 
 
-def _build_ring_blocks(shifts: Iterable[_AnyStages]) -> list[Block]:
+def _build_ring_blocks(shifts: Iterable[_Stages]) -> list[Block]:
     blocks: list[Block] = []
     for one in shifts:
         ring = one.stages.ring
         if ring is None:
             continue
-        how = (
-            "read from the extremes of the averaged curve"
-            if isinstance(one.stages, PaperShift)
-            else "from a decaying sine on a parabola, the engine torque's own motion included"
+        text = (
+            f"{one.by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, read from the extremes "
+            "of the averaged curve."
         )
-        text = f"{one.by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, {how}."
         blocks.append(FigureBlock(plot_ringdown(ring), text))
     return blocks
 
 
-def _list_refusals(shifts: Iterable[_AnyStages], stage: str) -> list[Block]:
+def _list_refusals(shifts: Iterable[_Stages], stage: str) -> list[Block]:
     texts = [
         f"{one.by}: {one.stages.refusals[stage]}" for one in shifts if stage in one.stages.refusals
     ]

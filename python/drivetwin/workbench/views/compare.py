@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compare: results of the paper's, the integral and the likelihood method side by side."""
+"""Compare: results of the paper's and the likelihood method side by side."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ def layout() -> list[Component]:
     return [
         ui.make_hint(
             "Parameters with intervals, simulation over measurement and friction of each method. "
-            "Run all three methods in the step Identify first."
+            "Run both methods in the step Identify first."
         ),
-        ui.make_button("Simulate and draw all methods", "draw-comparison"),
+        ui.make_button("Simulate and draw both methods", "draw-comparison"),
         html.Div(id="compare-content"),
     ]
 
 
 def register(page: ui.Page) -> None:
-    """Drawing on demand: the figures of three methods take seconds."""
+    """Drawing on demand: the figures of two methods take seconds."""
 
     @page.callback(Output("compare-content", "children"), Input(ui.make_due_id("compare"), "data"))
     def tables(session: Session, _: object) -> list[Component]:
@@ -47,7 +47,7 @@ def register(page: ui.Page) -> None:
         ]
         candidates = _collect_candidates(work)
         if len(candidates) < 2:
-            return [*refusals, ui.make_hint("Run at least two methods first.")]
+            return [*refusals, ui.make_hint("Run both methods first.")]
         return [*refusals, *render_section(build_agreement_section(candidates), "agree")]
 
     @page.callback(

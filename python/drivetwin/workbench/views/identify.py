@@ -42,13 +42,13 @@ class RunKind(StrEnum):
 _METHODS = {
     RunKind.DEFAULT: (DEFAULT_METHOD,),
     RunKind.ALL: tuple(Method),
-    RunKind.QUICK: (Method.PAPER, Method.INTEGRAL),
+    RunKind.QUICK: (DEFAULT_METHOD,),
     RunKind.PAPER: (Method.PAPER,),
 }
 _RUNS = {
     RunKind.DEFAULT.value: "likelihood, the default method",
-    RunKind.ALL.value: "all three methods, to compare",
-    RunKind.QUICK.value: "paper and integral (quick, no verdict)",
+    RunKind.ALL.value: "both methods, to compare",
+    RunKind.QUICK.value: "likelihood, quick: one model alone",
     RunKind.PAPER.value: "paper alone (no verdict)",
 }
 _POLL = 300
@@ -59,8 +59,7 @@ def layout() -> list[Component]:
     """Run, cancel, progress, outcome."""
     return [
         ui.make_hint(
-            "Runs in the background. Fixed and prior settings apply to the integral and likelihood "
-            "methods only."
+            "Runs in the background. Fixed and prior settings apply to the likelihood method only."
         ),
         ui.make_row(
             ui.make_choice("methods", "Methods", _RUNS, RunKind.DEFAULT),
@@ -96,7 +95,7 @@ def _register_buttons(page: ui.Page) -> None:
     @page.callback(Input("identify", "n_clicks"), State("methods", "data-value"))
     def start(session: Session, _: object, kind: RunKind) -> None:
         """Begin the identification."""
-        session.identify(_METHODS[kind])
+        session.identify(_METHODS[kind], is_quick=kind is RunKind.QUICK)
         ui.notify("")
         _notify_results(session)
 
@@ -173,7 +172,7 @@ def _build_content(work: SessionState, *, running: bool) -> list[Component]:
         content.append(
             ui.make_hint(
                 f"Finished: {names}. Only the likelihood method gives a verdict on the model. "
-                "Compare shows the values of all methods."
+                "Compare shows the values of both methods."
             )
         )
     content.append(_describe_inputs(work))

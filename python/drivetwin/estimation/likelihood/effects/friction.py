@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.likelihood.effects.effect import Disturbance, Effect, OperatingPoint
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     SyntheticVehicle,
@@ -15,7 +16,6 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
 )
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.likelihood.slip_contact import Contact
-from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import FrictionTable
 from drivetwin.vehicle.effects import EffectId

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
@@ -19,7 +20,6 @@ from drivetwin.estimation.likelihood.effects.effect import (
 )
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
 from drivetwin.estimation.likelihood.noise.shift_response import build_slip_row
-from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId
 

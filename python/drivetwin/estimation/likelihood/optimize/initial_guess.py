@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Initial values of the fit: from the linear method if it estimated them, else typical ones.
+"""Initial values of the fit from direct estimates, typical ones where a shift has none.
 
-Without an output torque only ratios over η are identifiable (THEORY section 6). With η = 1 the
-model's parameters are these ratios. Their initial values follow from:
+With an output torque the momentum balance gives η, Je, Jo′ and the delay of the engine torque, and
+the balance of the vehicle gives load and J3. Without one only ratios over η are identifiable
+(THEORY section 6). With η = 1 the model's parameters are these ratios:
 
     T_e = (Je/η)·ω_e' + (J5/η)·ω_e'/i_g² + (T_v/i_f/η)/i_g     in gear, both gears together
-    T_c/η = (T_e - (Je/η)·ω_e')/a                               in the inertia phase
+
+In both cases the oscillation after lock-up gives the shaft, and the inertia phase the friction
+level of the on-coming element:
+
+    T_c = (η·T_e - Je·ω_e')/a
 """
 
 from __future__ import annotations
@@ -24,149 +29,135 @@ from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
     ShiftSignals,
 )
+from drivetwin.estimation.direct.friction_law import LOG_V, MU_C, MU_DROP, MU_V
+from drivetwin.estimation.direct.friction_points import estimate_friction_law
+from drivetwin.estimation.direct.load_balance import estimate_load
+from drivetwin.estimation.direct.momentum_balance import estimate_momentum_inertia
+from drivetwin.estimation.direct.ringdown import estimate_pencil_start
+from drivetwin.estimation.direct.window_means import drop_nan_rows
 from drivetwin.estimation.likelihood.parametrization import LAW, build_load_deviations
-from drivetwin.estimation.linear.friction_points import LOG_V, MU_C, MU_DROP, MU_V
-from drivetwin.estimation.linear.load_balance import AERO
-from drivetwin.estimation.linear.pipeline import IntegralShift
-from drivetwin.estimation.linear.ringdown import estimate_pencil_start
-from drivetwin.estimation.paper.wlse import drop_nan_rows
 from drivetwin.simulation.dual_clutch import compute_series_inertia
 from drivetwin.vehicle.spec import compute_middle
 
+LOAD = "Tv_over_if"
 TYPICAL_LAW = {"mu_c": 0.11, "mu_drop": 0.02, "mu_v": 1e-4, "ln_v_s": float(np.log(12.0))}
 """Friction of a wet clutch facing where the log shows none."""
 TYPICAL_MODE = (2.0 * np.pi * 10.0, 0.06)
 """Angular frequency [rad/s] and damping ratio of a driveline where no ring-down was clean."""
 
 
-def _extrapolate_load(shift: IntegralShift, growth: float | None, i_f: float) -> float:
-    """Compute T_v/i_f [N m] of a shift under the common growth of the load: it is accurate at
-    the shift's own speed, and at the mean speed of the log as inaccurate as the shift's own
-    growth."""
-    found = shift.load
-    if growth is None or found.holds_at is None:
-        return found.load
-    away = (found.mean_speed**2 - found.holds_at**2) / i_f
-    return found.load + (float(found.fit.theta[2]) - growth) * away
-
-
-def estimate_initial_values(
-    shifts: Sequence[IntegralShift], drivelines: Sequence[KnownDriveline]
-) -> dict[str, float]:
-    """Compute an initial value of every driveline unknown and friction law from the linear fits.
-
-    The median over the shifts is used, because a single shift may be uninformative or wrong.
-    """
-    combined = {
-        name: float(np.median([dict(zip(s.ids, s.values, strict=True))[name] for s in having]))
-        for name in dict.fromkeys(name for shift in shifts for name in shift.ids)
-        for having in ([shift for shift in shifts if name in shift.ids],)
-    }
-    found = {
-        "eta": combined["eta"],
-        "J_e": float(np.median([shift.momentum.get_value("J_e") for shift in shifts])),
-        "J_out": combined["J_out"],
-        "J_vehicle": combined["J_vehicle"],
-        **build_load_deviations(
-            [_extrapolate_load(shift, combined.get(AERO), drivelines[0].i_f) for shift in shifts]
-        ),
-        "te_delay": combined.get("te_delay", shifts[0].momentum.get_value("te_delay")),
-    }
-    if AERO in combined:
-        found[AERO] = combined[AERO]
-    if "k_o" in combined:
-        found |= {"k_o": combined["k_o"], "c_o": combined["c_o"]}
-    else:
-        found |= _estimate_typical_shaft(found, drivelines[0])
-    return {k: float(v) for k, v in found.items()} | _collect_laws(shifts, drivelines)
-
-
-def _estimate_typical_shaft(
-    found: Mapping[str, float], driveline: KnownDriveline
-) -> dict[str, float]:
-    omega, zeta = TYPICAL_MODE
-    J4 = found["J_e"] * driveline.i_after**2 + found["J_out"]
-    J5 = found["J_vehicle"] / driveline.i_f**2
-    J = compute_series_inertia(J4, J5)
-    return {"k_o": J * omega**2, "c_o": 2.0 * zeta * omega * J}
-
-
-def _collect_laws(
-    shifts: Sequence[IntegralShift], drivelines: Sequence[KnownDriveline]
-) -> dict[str, float]:
-    """Compute law, P0 and drum of every element; one without a curve takes its partner's.
-
-    Of several curves the one that reaches the largest slip: beyond its slips a law may be anything,
-    even below zero.
-    """
-    found: dict[str, float] = {}
-    own: dict[str, dict[str, float]] = {}
-    reached: dict[str, float] = {}
-    for shift, d in zip(shifts, drivelines, strict=True):
-        for e in (d.offgoing, d.oncoming):
-            found.setdefault(f"{e.name}.P0", e.P0.value)
-        found |= {f"{e.name}.drum": e.drum.value for e in d.couplings.values()}
-        name = d.oncoming.name
-        if shift.friction is None or shift.friction.curve.slip[-1] <= reached.get(name, 0.0):
-            continue
-        reached[name] = float(shift.friction.curve.slip[-1])
-        theta = shift.friction.fit.theta
-        order = (MU_C, MU_DROP, MU_V, LOG_V)
-        own[name] = {key: float(theta[i]) for key, i in zip(LAW, order, strict=True)}
-        found[f"{name}.P0"] = shift.friction.P0
-    laws = dict(own)
-    for d in drivelines:
-        for e, partner in ((d.oncoming, d.offgoing), (d.offgoing, d.oncoming)):
-            laws.setdefault(e.name, own.get(partner.name, TYPICAL_LAW))
-    for name, law in laws.items():
-        found |= {f"{name}.{key}": value for key, value in law.items()}
-    return found
-
-
 @dataclass(frozen=True)
-class TorqueFreeGuessSettings:
-    """Settings of the initial values without an output torque."""
+class InitialGuessSettings:
+    """Settings of the initial values."""
 
     step: float = 0.1
     """Time over which speeds are differenced: about a period of the driveline oscillation [s]."""
     iterations: int = 3
     """Iterations of the instruments, the slopes expected from the estimate [-]."""
+    max_outside: float = 10.0
+    """Factor beyond the design range of J3 from which the balance of the vehicle counts as wrong:
+    without a wheel speed the swing of a soft shaft hides how little the vehicle changes its speed
+    [ratio]."""
     ringdown: tuple[float, float] = (0.05, 0.8)
     """Start and end, after lock-up, of the stretch in which the shaft oscillation is sought [s]."""
 
 
-GUESS = TorqueFreeGuessSettings()
+GUESS = InitialGuessSettings()
 
 
-def estimate_without_torque(
+def estimate_initial_values(
+    signals: Sequence[ShiftSignals], drivelines: Sequence[KnownDriveline], design: DesignData
+) -> dict[str, float]:
+    """Compute an initial value of every driveline unknown and friction law.
+
+    The median over the shifts is used, because a single shift may be uninformative or wrong. An
+    element that engages in no shift has the friction of its partner.
+    """
+    shifts = [_estimate_shift(*one, design) for one in zip(signals, drivelines, strict=True)]
+    found = {
+        name: float(np.median([one[name] for one in shifts if name in one]))
+        for name in dict.fromkeys(name for one in shifts for name in one)
+    }
+    found |= build_load_deviations([one[LOAD] for one in shifts])
+    for d in drivelines:
+        for one, partner in ((d.oncoming, d.offgoing), (d.offgoing, d.oncoming)):
+            law = {key: found.get(f"{partner.name}.{key}", TYPICAL_LAW[key]) for key in LAW}
+            found = {f"{one.name}.{key}": value for key, value in law.items()} | found
+    return found
+
+
+def _estimate_shift(
     signals: ShiftSignals, driveline: KnownDriveline, design: DesignData
 ) -> dict[str, float]:
-    """Compute an initial value of every unknown from speeds and engine torque of one shift.
-
-    With an output torque η is a plausible one, and the ratios stand for what they are ratios of.
-    """
-    inertia = _estimate_inertias(signals, driveline, design)
-    J_e, J_vehicle, load = inertia
-    J_out = 0.0 if driveline.J_out is None else driveline.J_out.value
-    J4, J5 = J_e * driveline.i_after**2 + J_out, J_vehicle / driveline.i_f**2
-    J = compute_series_inertia(J4, J5)
+    """Compute initial values from one shift; the friction is that of the on-coming element."""
+    found = _estimate_rigid(signals, driveline, design)
+    J4 = found["J_e"] * driveline.i_after**2 + found["J_out"]
+    J = compute_series_inertia(J4, found["J_vehicle"] / driveline.i_f**2)
     rate, omega = _estimate_mode(signals, driveline)
-    found = {
+    found |= {"k_o": J * (rate**2 + omega**2), "c_o": 2.0 * rate * J}
+    found |= {f"{one.name}.drum": one.drum.value for one in driveline.couplings.values()}
+    found |= {f"{one.name}.P0": one.P0.value for one in (driveline.offgoing, driveline.oncoming)}
+    law = _estimate_law(signals, driveline, found)
+    return found | {f"{driveline.oncoming.name}.{key}": value for key, value in law.items()}
+
+
+def _estimate_law(
+    signals: ShiftSignals, driveline: KnownDriveline, found: Mapping[str, float]
+) -> dict[str, float]:
+    """Estimate the law of the on-coming element; without an output torque its level alone."""
+    if signals.scale_known:
+        try:
+            theta = estimate_friction_law(signals, driveline)
+            order = (MU_C, MU_DROP, MU_V, LOG_V)
+            return {key: float(theta[k]) for key, k in zip(LAW, order, strict=True)}
+        except IdentificationError:
+            pass
+    level = _estimate_friction_level(signals, driveline, found["eta"], found["J_e"])
+    return {**TYPICAL_LAW, "mu_c": level}
+
+
+def _estimate_rigid(
+    signals: ShiftSignals, driveline: KnownDriveline, design: DesignData
+) -> dict[str, float]:
+    """Compute η, inertias, load and delay of the engine torque.
+
+    From speeds and engine torque alone where the log has no output torque, or the shift no
+    equation with it. η is then a plausible one, or 1 where all are ratios over it.
+    """
+    plain = _estimate_without_torque(signals, driveline, design)
+    if not signals.scale_known:
+        return plain
+    low, high = (
+        limit * factor
+        for limit, factor in zip(
+            design.J_vehicle_range, (1.0 / GUESS.max_outside, GUESS.max_outside), strict=True
+        )
+    )
+    try:
+        start = compute_middle(design.J_prime_range)
+        balance = estimate_momentum_inertia(signals, driveline, MOMENTUM, start)
+        names = ("eta", "J_e", "J_out", "te_delay")
+        plain |= {name: balance.get_value(name) for name in names}
+        load, J_vehicle = estimate_load(signals, driveline.i_f)
+    except IdentificationError:
+        return plain
+    return plain | {LOAD: load, "J_vehicle": J_vehicle} if low < J_vehicle < high else plain
+
+
+def _estimate_without_torque(
+    signals: ShiftSignals, driveline: KnownDriveline, design: DesignData
+) -> dict[str, float]:
+    """Compute η, inertias, load and delay from speeds and engine torque."""
+    J_e, J_vehicle, load = _estimate_inertias(signals, driveline, design)
+    J_out = 0.0 if driveline.J_out is None else driveline.J_out.value
+    return {
         "eta": PLAUSIBLE_ETA.value if signals.scale_known else 1.0,
         "J_e": J_e,
         "J_out": max(J_out, 0.05 * J_e),
         "J_vehicle": J_vehicle,
-        "Tv_over_if": load,
+        LOAD: load,
         "te_delay": MOMENTUM.delay_prior.value,
-        "k_o": J * (rate**2 + omega**2),
-        "c_o": 2.0 * rate * J,
     }
-    found |= {f"{one.name}.drum": one.drum.value for one in driveline.couplings.values()}
-    law = {**TYPICAL_LAW, "mu_c": _estimate_friction_level(signals, driveline, J_e)}
-    for one in (driveline.offgoing, driveline.oncoming):
-        found[f"{one.name}.P0"] = one.P0.value
-        found |= {f"{one.name}.{key}": value for key, value in law.items()}
-    return found
 
 
 def _estimate_inertias(
@@ -239,15 +230,17 @@ def _estimate_mode(signals: ShiftSignals, driveline: KnownDriveline) -> tuple[fl
         return zeta * omega, omega
 
 
-def _estimate_friction_level(signals: ShiftSignals, driveline: KnownDriveline, J_e: float) -> float:
-    """Estimate the mean μ/η over the middle half of the inertia phase."""
+def _estimate_friction_level(
+    signals: ShiftSignals, driveline: KnownDriveline, eta: float, J_e: float
+) -> float:
+    """Estimate the mean μ over the middle half of the inertia phase."""
     start, end = signals.shift.inertia_phase
     low, high = start + 0.25 * (end - start), end - 0.25 * (end - start)
     speed, element = signals.engine_speed, driveline.oncoming
     ends = np.interp([low, high], speed.time, speed.values)
     slope = float(ends[1] - ends[0]) / (high - low)
     time = np.linspace(low, high, 50)
-    torque = float(np.mean(signals.engine_torque.interpolate_at_times(time))) - J_e * slope
+    torque = eta * float(np.mean(signals.engine_torque.interpolate_at_times(time))) - J_e * slope
     above = (
         float(np.mean(signals.pressures[element.name].interpolate_at_times(time)))
         - element.P0.value

@@ -28,6 +28,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import TimedStages
+from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute_term_evidence
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
 from drivetwin.estimation.likelihood.data.input_smoothing import SMOOTHING
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
@@ -46,7 +47,6 @@ from drivetwin.estimation.likelihood.selection.plants import (
 )
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
 from drivetwin.estimation.likelihood.slip_contact import SLIPPING, evaluate_contact
-from drivetwin.estimation.linear.load_balance import AERO, LOAD_BALANCE, compute_term_evidence
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import LEAD, SHOWN, Group

@@ -88,7 +88,8 @@ def select_sampling_mode(
     so much that no search with them ends at a plausible minimum. Where that fails too the signals
     are taken as read.
     """
-    modes = _find_nearby_modes(problem, start)
+    is_chosen = is_enabled(Mechanism.SAMPLING_MODES)
+    modes = _find_nearby_modes(problem, start) if is_chosen else frozenset()
     if modes is None and (gear := fit_lower_gear_only(problem, start, shifts)) is not None:
         modes = _find_nearby_modes(gear.problem, gear.point)
     modes = modes or frozenset()

@@ -18,6 +18,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
 from drivetwin.estimation.likelihood.diagnostics.identifiability import locate_bounds
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
@@ -49,7 +50,6 @@ from drivetwin.estimation.likelihood.selection.sampling_mode import (
     widen_over_modes,
 )
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
-from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate_set import report_growth
 from drivetwin.findings import Finding

@@ -20,11 +20,11 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, ShiftModel
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
-from drivetwin.estimation.linear.friction_points import evaluate_stribeck
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.suggestion import CardNumber, CardNumberKind

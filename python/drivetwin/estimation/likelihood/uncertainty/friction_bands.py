@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, propagate_variance
+from drivetwin.estimation.direct.friction_law import build_law_derivatives, evaluate_stribeck
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.friction import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
@@ -16,7 +16,6 @@ from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.likelihood.slip_contact import find_loaded_slips
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import differentiate
-from drivetwin.estimation.linear.friction_points import build_law_derivatives, evaluate_stribeck
 from drivetwin.estimation.result.cause import SHOWN, Group
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.findings import Code, explain
@@ -28,36 +27,29 @@ METHOD = "likelihood"
 POINTS = 60
 
 
-def find_reference_slips(
-    fit: LikelihoodFit, linear: Mapping[str, FrictionCurve]
-) -> dict[str, float]:
+def find_reference_slips(fit: LikelihoodFit) -> dict[str, float]:
     """Return the slip [rad/s] in the middle of the curve of every element whose law is free."""
-    return {name: _find_base(fit, linear, name).middle_slip for name in _list_free_laws(fit)}
+    return {name: _build_empty_curve(fit, name).middle_slip for name in _list_free_laws(fit)}
 
 
-def build_friction_curves(
-    fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], correction: Correction
-) -> dict[str, FrictionCurve]:
+def build_friction_curves(fit: LikelihoodFit, correction: Correction) -> dict[str, FrictionCurve]:
     """Compute the curves of all elements, for the gains of the vehicle card.
 
-    `linear` are the curves of the linear method: their points and slip range are shown. Its
-    place is taken by the slips of the simulation where there is none. The band is that of the law
-    and of the shapes beside it, with all effects; the curve contains shapes with evidence. An
-    element that only disengages has the law of its partner with a level of its own, over the slips
-    of the partner.
+    A curve covers the slips at which the element transmits torque in the simulated shifts. The band
+    is that of the law and of the shapes beside it, with all effects; the curve contains shapes with
+    evidence. An element that only disengages has the law of its partner with a level of its own,
+    over the slips of the partner.
     """
     found: dict[str, FrictionCurve] = {}
     for name in _list_free_laws(fit):
-        base = _find_base(fit, linear, name)
+        base = _build_empty_curve(fit, name)
         curve = _build_curve(fit, correction, name, base)
         slopes = evaluate_stribeck(_get_law(fit, correction, name)[0], base.slip)[1]
         change, variance = _add_shapes(fit, correction, name, base.slip, slopes)
         found[name] = _set_band(curve, curve.mu + change, np.sqrt(variance))
     for name, partner in fit.problem.terms[0].structure.partners.items():
         if partner in found:
-            empty = np.empty(0)
-            base = replace(found[partner], points_slip=empty, points_mu=empty)
-            curve = _build_curve(fit, correction, name, base)
+            curve = _build_curve(fit, correction, name, found[partner])
             found[name] = replace(
                 curve,
                 verdict=Verdict.DESIGN,
@@ -70,10 +62,6 @@ def _list_free_laws(fit: LikelihoodFit) -> list[str]:
     """List the elements whose friction law is free."""
     every = (one.name for term in fit.problem.terms for one in term.structure.elements)
     return [name for name in dict.fromkeys(every) if has_free_law(fit.point, name)]
-
-
-def _find_base(fit: LikelihoodFit, linear: Mapping[str, FrictionCurve], name: str) -> FrictionCurve:
-    return linear.get(name) or _build_empty_curve(fit, name)
 
 
 def _get_gain(fit: LikelihoodFit, name: str) -> PriorValue:

@@ -16,8 +16,7 @@ their design priors; Jo′ has one too. The delay of the engine torque is estima
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -57,48 +56,15 @@ DELAY = DelaySettings()
 
 
 @dataclass(frozen=True, eq=False)
-class DelayScan:
-    """Q of the regression over the assumed delay of the engine torque: `delay` [s], `q`, (n,).
-
-    `best` is the delay at the minimum, None where the engine torque moves too little to show it.
-    """
-
-    delay: FloatArray
-    q: FloatArray
-    best: float | None
-
-    def can_estimate_delay(self, std: float) -> bool:
-        """Return True if the engine torque varies enough to estimate its delay to `std` [s]."""
-        return std < DELAY.max_std and float(np.ptp(self.q)) > DELAY.min_rise
-
-
-@dataclass(frozen=True, eq=False)
 class MomentumFit:
-    """Result of the joint regression. `names` are the parameters of `fit.theta`, in order,
-    `priors` what was known of them beforehand, by name.
-
-    Evidence for the report, one entry per window: `time` [s], `stretch` name, `drive` = mean
-    η·T_e - T_o/i [N m] and `acceleration` [rad/s^2] over the window, `inertia_torque` the fitted
-    right-hand side [N m].
-    """
+    """Result of the joint regression; `names` are the parameters of `fit.theta`, in order."""
 
     names: tuple[str, ...]
-    priors: Mapping[str, PriorValue]
     fit: Fit
-    scan: DelayScan
-    time: FloatArray
-    stretch: tuple[str, ...]
-    drive: FloatArray
-    acceleration: FloatArray
-    inertia_torque: FloatArray
-
-    def find_index(self, name: str) -> int:
-        """Position of a parameter in `fit.theta`."""
-        return self.names.index(name)
 
     def get_value(self, name: str) -> float:
         """Estimate of one parameter."""
-        return float(self.fit.theta[self.find_index(name)])
+        return float(self.fit.theta[self.names.index(name)])
 
 
 def list_momentum_names(driveline: KnownDriveline) -> tuple[str, ...]:
@@ -133,7 +99,6 @@ class _Equations:
         self.windows = join_windows([s.windows for s in found])
         counts = [s.windows.count for s in found]
         self.ratio = np.repeat([s.ratio for s in found], counts)
-        self.stretch = tuple(np.repeat([s.name for s in found], counts).tolist())
         tied = np.repeat([s.tied for s in found], counts)
         self.constant = Quadrature(csr_array(0.5 * self.windows.width[:, None]))
         self.torque = build_hann_kernels(signals.output_torque.time, self.windows).psi
@@ -207,15 +172,15 @@ def _build_priors(
     return found | {f"drum.{one.name}": one.drum for one in driveline.drums}
 
 
-def compute_prior_std(prior: PriorValue) -> float:
+def _compute_prior_std(prior: PriorValue) -> float:
     """Standard deviation of a prior; a known value gets one too small to matter."""
     return prior.std if prior.std > 0.0 else 1e-6 * max(abs(prior.value), 1e-6)
 
 
 def _scan_delays(
-    equations: _Equations, theta: FloatArray, prior: Prior, delays: tuple[float, ...]
-) -> DelayScan:
-    """Q over the delay of the engine torque, the other parameters fitted at each delay.
+    equations: _Equations, theta: FloatArray, prior: Prior, delays: FloatArray
+) -> FloatArray:
+    """Q (n,) over the delay of the engine torque (n,), the other parameters fitted at each delay.
 
     The weighting is that at `theta`; the equations are then linear in the rest.
     """
@@ -227,7 +192,7 @@ def _scan_delays(
     torque = equations.signals.engine_torque
     drives = [
         build_hann_kernels(torque.time, equations.windows, delay).psi.matrix @ torque.values
-        for delay in delays
+        for delay in delays.tolist()
     ]
     weight = np.sqrt(np.diag(prior.precision))[free]
     ties = np.column_stack([-weight * prior.mean[free], np.diag(weight)])
@@ -238,8 +203,7 @@ def _scan_delays(
         design = np.column_stack([np.concatenate([drive, pad]), rows[:, 1:]])
         solution = np.linalg.lstsq(design, -rows[:, 0], rcond=None)[0]
         q.append(float(np.sum((design @ solution + rows[:, 0]) ** 2)))
-    grid, values = np.asarray(delays), np.asarray(q)
-    return DelayScan(grid, values, interpolate_parabola_minimum(grid, values))
+    return np.asarray(q)
 
 
 def interpolate_parabola_minimum(x: FloatArray, y: FloatArray) -> float:
@@ -267,42 +231,17 @@ def estimate_momentum_inertia(
     names = list_momentum_names(driveline)
     priors = _build_priors(signals, driveline, settings)
     entries = {
-        names.index(name): (one.value, compute_prior_std(one)) for name, one in priors.items()
+        names.index(name): (one.value, _compute_prior_std(one)) for name, one in priors.items()
     }
     prior = Prior.from_independent(len(names), entries)
     start = prior.mean.copy()
     start[:2] = 0.9, start_inertia
     first = solve(equations.terms, start, prior.fix_parameter(3, start[3]), tolerance=0.1)
-    scan = _scan_delays(equations, first.theta, prior, settings.delay_grid)
+    delays = np.asarray(settings.delay_grid)
+    powers = _scan_delays(equations, first.theta, prior, delays)
     theta = first.theta.copy()
-    theta[3] = scan.best
+    theta[3] = interpolate_parabola_minimum(delays, powers)
     fit = solve(equations.terms, theta, prior)
-    if not scan.can_estimate_delay(fit.std[3]):
+    if fit.std[3] >= DELAY.max_std or float(np.ptp(powers)) <= DELAY.min_rise:
         fit = solve(equations.terms, first.theta, prior.fix_parameter(3, start[3]))
-        scan = replace(scan, best=None)
-    return _attach_fit_results(equations, names, priors, fit, scan)
-
-
-def _attach_fit_results(
-    equations: _Equations,
-    names: tuple[str, ...],
-    priors: Mapping[str, PriorValue],
-    fit: Fit,
-    scan: DelayScan,
-) -> MomentumFit:
-    area = 0.5 * equations.windows.width
-    drive, load, engine, output, _ = (
-        t.factor * (t.quadrature.matrix @ t.values) / area for t in equations.terms(fit.theta)
-    )
-    speed = equations.signals.engine_speed
-    return MomentumFit(
-        names,
-        priors,
-        fit,
-        scan,
-        equations.windows.centre,
-        equations.stretch,
-        drive + load,
-        (equations.engine.matrix @ speed.values) / area,
-        -(engine + output),
-    )
+    return MomentumFit(names, fit)

@@ -15,7 +15,7 @@ import numpy as np
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import PreparedLog, ShiftData
-from drivetwin.estimation.linear.momentum_balance import (
+from drivetwin.estimation.direct.momentum_balance import (
     DELAY,
     estimate_momentum_inertia,
     interpolate_parabola_minimum,

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Direct estimates of single parameters, without a simulation."""

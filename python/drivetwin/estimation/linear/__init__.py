@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Weighted linear estimators of the integral method."""
