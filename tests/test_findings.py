@@ -147,16 +147,10 @@ def test_a_request_is_recognised() -> None:
     assert list_asked(scale, "[inertia]\nJ_out_kgm2 = 1.0") == set()
 
 
-@pytest.mark.parametrize(
-    "method",
-    [
-        drivetwin.Method.INTEGRAL,
-        pytest.param(drivetwin.Method.LIKELIHOOD, marks=pytest.mark.exhaustive),
-    ],
-)
+@pytest.mark.parametrize("is_quick", mark_repeats([True, False], [True]))
 @pytest.mark.parametrize("scenario", mark_repeats(("paper_steps", "dual_clutch"), ("paper_steps",)))
 def test_a_remedy_never_asks_for_what_is_stated(
-    scenario: str, method: drivetwin.Method, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    scenario: str, is_quick: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, log_path = tmp_path / "log.card.toml", tmp_path / "log.csv"
     assert main(["synth", "--scenario", scenario, "--seed", "1", "-o", str(log_path)]) == 0
@@ -165,7 +159,8 @@ def test_a_remedy_never_asks_for_what_is_stated(
     card = drivetwin.load_card(path)
     log = drivetwin.read_log(log_path, card)
     shifts = drivetwin.detect_shifts(log, card)
-    found = drivetwin.identify(log, card, shifts, method)
+    with drivetwin.quick(is_quick):
+        found = drivetwin.identify(log, card, shifts)
     told = [one.remedy for one in found.findings]
     told += [one.reason for one in found.estimates.values()]
     for command in (["inspect"], ["shifts"], ["card", "check"]):

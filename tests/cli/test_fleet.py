@@ -26,7 +26,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     make_fleet(folder / "logs", COUNT)
     (folder / "logs" / "unit_07" / "empty_at_1.0_Mm.csv").write_bytes(b"")
     command = ["fleet", str(folder / "logs"), "--vehicle", str(folder / "logs" / "rules.toml")]
-    command += ["-o", str(folder / "store"), "--method", "integral", "--workers", "1"]
+    command += ["-o", str(folder / "store"), "--quick", "--workers", "1"]
     assert main([*command, "--reports", "--traces"]) == 0
     return folder
 
@@ -34,7 +34,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _run(fleet: Path, *more: str) -> int:
     rules = str(fleet / "logs" / "rules.toml")
     command = ["fleet", str(fleet / "logs"), "--vehicle", rules, "-o", str(fleet / "store")]
-    return main([*command, "--method", "integral", "--workers", "1", *more])
+    return main([*command, "--quick", "--workers", "1", *more])
 
 
 def test_a_second_run_computes_nothing_and_tells_events(
@@ -94,7 +94,10 @@ def test_links_lead_to_every_single_report_from_wherever_the_page_is(
     assert {(page.parent / link).resolve() for link in links} == singles
 
 
-def test_estimates_are_told(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_estimates_are_told(
+    fleet: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
     store = str(fleet / "store")
     assert main(["fleet", "estimate", store, "--parameter", "eta", "--json"]) == 0
     (eta,) = json.loads(capsys.readouterr().out)["estimates"]
@@ -155,7 +158,7 @@ def test_dates_of_a_list_are_dates_everywhere(
     (tmp_path / "list.csv").write_text("\n".join(["path,recorded", *dated]))
     rules = (fleet / "logs" / "rules.toml").read_text().split("[fields")[0]
     (fleet / "logs" / "dated.toml").write_text(f'{rules}[fields.date]\ncolumn = "recorded"\n')
-    command = ["fleet", "--list", str(tmp_path / "list.csv"), "--method", "integral", "--json"]
+    command = ["fleet", "--list", str(tmp_path / "list.csv"), "--quick", "--json"]
     command += ["--vehicle", str(fleet / "logs" / "dated.toml"), "-o", str(fleet / "store")]
     assert main(command) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["computed"] == 0

@@ -25,7 +25,7 @@ def folder(tmp_path: Path) -> Path:
 
 def _scan(folder: Path, known: Any = None, rules: str = RULE, seconds: float = 60.0) -> list[Any]:
     (folder / "rules.toml").write_text(rules)
-    return scan_files(folder / "rules.toml", [str(folder / "*.csv")], known, seconds)
+    return scan_files(folder / "rules.toml", [str(folder / "*.csv")], known, seconds=seconds)
 
 
 def test_a_file_that_did_not_change_is_not_read_again(folder: Path) -> None:

@@ -64,9 +64,9 @@ def run_toys(
     return run_fleet(request(logs, store, **changes), tell or events.append), events
 
 
-def scan_files(rules: Path, given: Sequence[str], known: Any = None, *limits: float) -> list[Any]:
+def scan_files(rules: Path, given: Sequence[str], known: Any = None, **limits: Any) -> list[Any]:
     """Scan files as a run does."""
-    made = scan.Scan(read_rules(rules), Method.PAPER, *limits)
+    made = scan.Scan(read_rules(rules), Method.PAPER, **limits)
     return list(made.scan_files(Sources([*given]), (known or {}).get))
 
 

@@ -126,7 +126,7 @@ def estimates() -> dict[str, Estimate]:
         "P0.B3": (8.2e4, 2200.0, 0.0),
     }
     found = {
-        key: Estimate(key, value, noise, Verdict.IDENTIFIED, "integral", systematic)
+        key: Estimate(key, value, noise, Verdict.IDENTIFIED, "likelihood", systematic)
         for key, (value, noise, systematic) in told.items()
     }
     found["c_o"] = Estimate(
@@ -137,7 +137,7 @@ def estimates() -> dict[str, Estimate]:
         None,
         None,
         Verdict.NOT_IDENTIFIABLE,
-        "integral",
+        "likelihood",
         reason="the engine torque is constant; record throttle steps",
     )
     return found
@@ -148,7 +148,7 @@ def friction() -> FrictionCurve:
     slip = np.linspace(2.0, 95.0, 60)
     mu = np.asarray(0.11 + 0.025 * np.exp(-slip / 15.0) + 1e-4 * slip)
     scatter = 5e-4 * np.random.default_rng(3).standard_normal(slip.size)
-    return FrictionCurve(slip, mu, mu - 2e-3, mu + 2e-3, slip, mu + scatter, STRIBECK, "integral")
+    return FrictionCurve(slip, mu, mu - 2e-3, mu + 2e-3, slip, mu + scatter, STRIBECK, "likelihood")
 
 
 def validation() -> Validation:
@@ -207,7 +207,7 @@ def identification() -> Identification:
         shifts=(SHIFT,),
         rejected=(RejectedShift((2.5, 2.6), "the new gear never locks"),),
         fit={},
-        method=Method.INTEGRAL,
+        method=Method.LIKELIHOOD,
         loss_law="paper",
         validity={
             "slip": (0.0, 95.0),

@@ -20,10 +20,10 @@ from tests.report.sample import SHIFT, card, friction, identification, log
 def make_candidate(name: str, **values: tuple[float, float | None]) -> Candidate:
     """A candidate with some parameters: value and standard deviation, None without one."""
     estimates = {
-        key: Estimate(key, value, std, Verdict.IDENTIFIED, "integral")
+        key: Estimate(key, value, std, Verdict.IDENTIFIED, "likelihood")
         for key, (value, std) in values.items()
     }
-    return Candidate(name, "integral", estimates, {}, {}, {}, "1")
+    return Candidate(name, "likelihood", estimates, {}, {}, {}, "1")
 
 
 def test_values_agree_within_their_uncertainty() -> None:

@@ -36,7 +36,7 @@ def test_rows_carry_name_value_interval_unit_and_verdict() -> None:
     rows = get_rows(identification())
     texts = [cell.text for cell in rows["J_prime_2"]]
     assert texts[0] == "Inertia at engine J′ (2)"
-    assert texts[1:] == ["17.50", "0.42", "0.16", "kg·m²", "identified", "integral"]
+    assert texts[1:] == ["17.50", "0.42", "0.16", "kg·m²", "identified", "likelihood"]
     assert rows["J_prime_2"][0].note == "J_prime_2"
     assert [rows["P0.B3"][k].text for k in (1, 4)] == ["0.820", "bar"]
     assert [rows["k_o"][k].text for k in (1, 4)] == ["176.0", "kNm/rad"]

@@ -31,7 +31,7 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     log = folder / "shift.csv"
     assert main(["synth", "-o", str(log)]) == 0
     card, out = str(log.with_suffix(".card.toml")), str(folder / "out")
-    assert main(["identify", str(log), "--vehicle", card, "--method", "integral", "-o", out]) == 0
+    assert main(["identify", str(log), "--vehicle", card, "--quick", "-o", out]) == 0
     return log, folder / "out" / "twin.toml"
 
 

@@ -55,7 +55,7 @@ def test_the_result_does_not_depend_on_the_format(
     """By the fast method, which uses every channel; the channels themselves are compared above."""
     card, results = str(logs["mf4"].with_name("log.card.toml")), []
     for name in ("csv", "mf4"):
-        command = ["identify", str(logs[name]), "--vehicle", card, "--method", "integral", "--json"]
+        command = ["identify", str(logs[name]), "--vehicle", card, "--quick", "--json"]
         assert main(command) == 0
         results.append(json.loads(capsys.readouterr().out.replace(f"log.{name}", "log")))
     first, other = (list_numbers(one) for one in results)

@@ -12,12 +12,10 @@ import pytest
 import drivetwin
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.method import Method
 from drivetwin.findings import Code
 from drivetwin.pipeline import identify
 from drivetwin.twin.build import build_twin
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario
-from tests.support.repeats import mark_repeats
 from tests.support.shared_results import shared
 
 LATER = 60.0
@@ -40,17 +38,13 @@ def hilly() -> ShiftLog:
 
 
 @shared
-def found(method: Method) -> Identification:
+def found() -> Identification:
     log = hilly()
-    return identify(log, card(), drivetwin.detect_shifts(log, card()), method)
+    return identify(log, card(), drivetwin.detect_shifts(log, card()))
 
 
-@pytest.mark.parametrize(
-    "method", mark_repeats([Method.INTEGRAL, Method.LIKELIHOOD], [Method.LIKELIHOOD])
-)
-def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it(method: Method) -> None:
-    one, model = found(method), scenario().model
-    assert one.method is method
+def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it() -> None:
+    one, model = found(), scenario().model
     truth = {"Tv_over_if": float(np.mean(LOADS)), "J_vehicle": model.J_v, "eta": model.eta}
     for name, value in truth.items():
         told = one.estimates[name]
@@ -64,7 +58,7 @@ def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it(method: M
 
 
 def test_each_shift_is_simulated_on_its_own_grade() -> None:
-    one, log = found(Method.LIKELIHOOD), hilly()
+    one, log = found(), hilly()
     twin = build_twin(one, card())
     own = drivetwin.attach_validation(one, twin, log)
     flat = replace(one, evidence=replace(one.evidence, loads=()))

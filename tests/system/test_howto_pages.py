@@ -28,7 +28,7 @@ LONG = {
     "compare.md": (
         *OUT,
         "copy out monday",
-        "identify shift.csv --vehicle truck.toml --method integral -o tuesday",
+        "identify shift.csv --vehicle truck.toml --quick -o tuesday",
         "synth --seed 2 -o wednesday.csv",
     ),
     "drive.md": (),

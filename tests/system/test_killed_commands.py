@@ -56,7 +56,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         synthesize(made / "logs" / f"{name}.csv", "paper_steps", seed)
     log, card = made / "logs" / "bench.csv", made / "logs" / "bench.card.toml"
     arguments = ["identify", str(log), "--vehicle", str(card), "-o", str(made / "twin")]
-    assert main([*arguments, "--method", "integral"]) == 0
+    assert main([*arguments, "--quick"]) == 0
     return made
 
 
@@ -64,7 +64,7 @@ def list_commands(folder: Path, output: Path) -> dict[str, list[str]]:
     """Arguments of the commands that write."""
     log, card = str(folder / "logs" / "bench.csv"), str(folder / "logs" / "bench.card.toml")
     twin, logs = str(folder / "twin" / "twin.toml"), str(folder / "logs" / "*.csv")
-    given, quick = ["--vehicle", card], ["--method", "integral"]
+    given, quick = ["--vehicle", card], ["--quick"]
     short = ["--shift", "2-3", "--effort", "0.05", "--draws", "200"]
     return {
         "identify": ["identify", log, *given, *quick, "-o", str(output / "out")],
@@ -75,8 +75,7 @@ def list_commands(folder: Path, output: Path) -> dict[str, list[str]]:
             "fleet",
             logs,
             *given,
-            "--method",
-            "integral",
+            "--quick",
             "--json",
             "-o",
             str(output / "store"),

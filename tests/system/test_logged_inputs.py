@@ -77,7 +77,7 @@ def identify(name: str) -> Known:
         log, card = GIVEN[name]
         if not log.exists():
             pytest.skip("the shared logs are not beside this checkout")
-    arguments = ["--vehicle", str(card), "--method", "integral", "-o", str(folder / "out")]
+    arguments = ["--vehicle", str(card), "--quick", "-o", str(folder / "out")]
     assert main(["identify", str(log), *arguments]) == 0
     twin, to = folder / "out/twin.toml", folder / "simulated.csv"
     assert main(["simulate", str(twin), str(log), "-o", str(to)]) == 0

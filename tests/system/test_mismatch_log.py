@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from benchmarks.estimation.mismatch_log import Rates, make_mismatch_log
-from drivetwin.estimation.result.method import Method
-from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.vehicle.effects import EffectId
 from tests.support.repeats import mark_repeats
@@ -49,10 +47,3 @@ def test_backlash_is_crossed() -> None:
     motion = made.recorded.trajectory
     assert np.count_nonzero(motion.shaft_torque == 0.0) > 5
     assert motion.shaft_torque.min() < 0.0
-
-
-def test_a_ring_that_divide_and_conquer_cannot_decompose_is_fitted() -> None:
-    """All numbers of the matrix are finite; NumPy's driver ends without convergence."""
-    made = make_mismatch_log(5, None, 0.0, Rates.BUS)
-    found = identify(made.log, made.card, detect_shifts(made.log, made.card), Method.INTEGRAL)
-    assert found.estimates["k_o"].value is not None

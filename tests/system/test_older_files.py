@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -62,3 +64,15 @@ def test_a_file_that_lacks_entries_is_refused_with_the_command_that_writes_it(
     path.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(ResultFileError, match=r"write it again with 'drivetwin.identify'"):
         load_result(path)
+
+
+@pytest.mark.parametrize(("name", "load"), [("result.json", load_result), ("twin.toml", load_twin)])
+def test_a_result_of_the_integral_method_is_refused_by_name(
+    name: str, load: Callable[[Path], object], tmp_path: Path
+) -> None:
+    text = (OLDER / name).read_text(encoding="utf-8")
+    changed = re.sub(r'("?method"?\s*[:=]\s*)"likelihood"', r'\1"integral"', text, count=1)
+    assert changed != text
+    (tmp_path / name).write_text(changed, encoding="utf-8")
+    with pytest.raises(ResultFileError, match=r"'method': .* 'paper' or 'likelihood'"):
+        load(tmp_path / name)

@@ -48,7 +48,7 @@ def test_from_a_log_without_units_to_a_simulation_of_another(
     assert main(["identify", str(log), "--vehicle", str(card), "-o", str(first / "out")]) == 2
     text = mapping.read_text(encoding="utf-8")
     mapping.write_text(re.sub(r"(?m)^# (unit = )", r"\1", text), encoding="utf-8")
-    identified = ["identify", str(log), "--vehicle", str(card), "--method", "integral"]
+    identified = ["identify", str(log), "--vehicle", str(card), "--quick"]
     assert main([*identified, "-o", str(first / "out")]) == 0
 
     other, _ = write_german(second, "log.csv", seed=5)

@@ -101,7 +101,7 @@ def twin(truth: dict[str, Any]) -> Twin:
     elements = dict(zip(("B2", "B3"), truth["clutches"], strict=True))
     return Twin(
         name="reference",
-        method=Method.INTEGRAL,
+        method=Method.LIKELIHOOD,
         loss_law="paper",
         i_in=given["i_in"],
         final_drive=given["i_f"],

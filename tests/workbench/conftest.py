@@ -42,11 +42,11 @@ def session(place: Path) -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def identified(place: Path) -> Iterator[Any]:
-    """A session that has identified the log by the paper's and the linear method."""
+    """A session that has identified the log by the paper's method and a quick likelihood."""
     sessions = Sessions(Folder.from_path(place))
     one = sessions.get(sessions.create())
     one.open(one.get_folder_source(LOG), one.get_folder_source(CARD))
-    one.identify([Method.PAPER, Method.INTEGRAL])
+    one.identify([Method.PAPER, Method.LIKELIHOOD], is_quick=True)
     finish(one)
     yield one
     sessions.close()

@@ -33,9 +33,9 @@ def test_what_ends_one_method_is_told_beside_what_the_others_find(
     work = identified.work
     found: list[Any] = []
     task = identifying.Task(
-        work.build_sources(), work.require_card(), (Method.PAPER, Method.INTEGRAL)
+        work.build_sources(), work.require_card(), (Method.PAPER, Method.LIKELIHOOD), is_quick=True
     )
     identifying.identify_all(found.append, task)
     refusal, outcome = found
     assert told in refusal.text
-    assert outcome.method is Method.INTEGRAL
+    assert outcome.method is Method.LIKELIHOOD

@@ -32,9 +32,9 @@ def test_locks_and_phases_reach_the_identification(session: Any) -> None:
     time = shift.torque_phase[0] - 0.004
     session.move_boundaries(0, {Boundary.TORQUE: time})
     session.set_lock("k_o", Lock(LockKind.FIXED, 1.6e5))
-    session.identify([Method.INTEGRAL])
+    session.identify([Method.LIKELIHOOD], is_quick=True)
     with pytest.raises(InputError, match="running"):
-        session.identify([Method.INTEGRAL])
+        session.identify([Method.LIKELIHOOD], is_quick=True)
     finish(session)
     outcome = session.work.require_outcome()
     assert outcome.twin.parameters["k_o"].value == pytest.approx(1.6e5)
@@ -44,7 +44,7 @@ def test_locks_and_phases_reach_the_identification(session: Any) -> None:
 
 def test_why_an_identification_ended_early_is_kept_until_the_next(session: Any) -> None:
     _open(session)
-    session.identify([Method.INTEGRAL])
+    session.identify([Method.LIKELIHOOD], is_quick=True)
     assert session.job is not None
     session.job.process.kill()
     with pytest.raises(InputError, match="was killed by") as ended:

@@ -32,11 +32,12 @@ def test_log_and_card_lead_to_the_identification(session: Any) -> None:
 
 
 def test_only_the_default_method_completes_the_identification(identified: Any) -> None:
-    work, outcome = identified.work, identified.work.require_outcome()
+    best = identified.work.require_outcome()
+    paper = identified.work.results[Method.PAPER]
+    work = replace(identified.work, results={Method.PAPER: paper}, method=Method.PAPER)
     assert _assess(work)[0]["identify"].status.name == "NEXT"
-    best = replace(outcome, method=Method.LIKELIHOOD)
-    for status in type(outcome.found.status):
-        found = replace(outcome.found, status=status)
+    for status in type(best.found.status):
+        found = replace(best.found, status=status)
         state = _assess(work.add_result(replace(best, found=found)))[0]["identify"]
         assert state.status.name == "DONE"
         assert state.text.startswith(f"Model {status.value}: ")
@@ -53,6 +54,7 @@ def test_model_and_export_are_done_when_they_were_used(identified: Any, used: bo
     work = replace(identified.work, has_viewed=used, has_exported=used)
     states, _ = _assess(work)
     assert {states[name].status.name == "DONE" for name in ("model", "export")} == {used}
-    other = replace(work.require_outcome(), twins={})
-    states, _ = _assess(replace(work, results={**work.results, other.method: other}))
+    paper = replace(work.results[Method.PAPER], twins={})
+    results = {**work.results, Method.PAPER: paper}
+    states, _ = _assess(replace(work, results=results, method=Method.PAPER))
     assert ("was not fitted" in states["model"].text) == used

@@ -17,9 +17,9 @@ from drivetwin.workbench.what_if import simulate_identified
 @pytest.fixture
 def moved(identified: Any) -> Iterator[Any]:
     """A session whose sliders go back afterwards."""
-    identified.choose_method(Method.INTEGRAL)
+    identified.choose_method(Method.LIKELIHOOD)
     yield identified
-    identified.choose_method(Method.INTEGRAL)
+    identified.choose_method(Method.LIKELIHOOD)
 
 
 def test_at_rest_the_run_is_that_of_the_identification(moved: Any) -> None:

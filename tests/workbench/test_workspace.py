@@ -31,7 +31,7 @@ def saved(identified: Any) -> Iterator[Path]:
     yield identified.folder.root / name
     identified.move_boundaries(0, {})
     identified.set_lock("k_o", Lock(LockKind.FREE))
-    identified.choose_method(Method.INTEGRAL)
+    identified.choose_method(Method.LIKELIHOOD)
 
 
 def test_a_reopened_workspace_goes_on_where_it_was(
@@ -79,7 +79,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], object]:
         (lambda c: c["logs"][0].update(phases={"0": {"dawn": 1.0}}), "phases"),
         (lambda c: c["logs"][0].update(channels={"nonsense": {"source": "x"}}), "channels"),
         (lambda c: c["logs"].append(c["logs"][0]), "twice"),
-        (lambda c: c["twins"]["integral"]["bench.csv"].pop("parameters"), "twins"),
+        (lambda c: c["twins"]["likelihood"]["bench.csv"].pop("parameters"), "twins"),
     ],
 )
 def test_a_damaged_key_is_named(

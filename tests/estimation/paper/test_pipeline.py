@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.direct.window_means import compute_window_edges
 from drivetwin.estimation.paper.pipeline import ETA_GRID, identify_paper_shift
-from drivetwin.estimation.paper.wlse import Weighting, compute_window_edges, fit_weighted_inertia
+from drivetwin.estimation.paper.wlse import Weighting, fit_weighted_inertia
 from drivetwin.findings import Code
 from tests.estimation.synthetic import Run, Truth
 

@@ -15,7 +15,6 @@ from drivetwin.estimation.result.verdict import (
     compute_correlation,
     find_limit,
     get_advice,
-    propagate,
     refuse_parameter,
 )
 from drivetwin.parameters import SPECS
@@ -31,14 +30,14 @@ from drivetwin.vehicle.spec import PriorValue
     ],
 )
 def test_verdict_follows_the_width(std: float, verdict: Verdict) -> None:
-    estimate = assess("J_prime_2", 17.5, std, "integral")
+    estimate = assess("J_prime_2", 17.5, std, "likelihood")
     assert estimate.verdict is verdict
     assert (estimate.value is None) == (verdict is Verdict.NOT_IDENTIFIABLE)
     assert (estimate.reason == "") == (verdict is Verdict.IDENTIFIED)
 
 
 def test_systematic_part_counts_in_the_verdict() -> None:
-    assert assess("eta", 0.85, 0.001, "integral", 0.3).verdict is Verdict.WEAK
+    assert assess("eta", 0.85, 0.001, "likelihood", 0.3).verdict is Verdict.WEAK
 
 
 @pytest.mark.parametrize(
@@ -47,22 +46,22 @@ def test_systematic_part_counts_in_the_verdict() -> None:
 def test_no_experiment_is_advised_where_the_sensors_decide(
     noise: float, systematic: float | None, sensors: bool
 ) -> None:
-    reason = assess("eta", 0.85, noise, "integral", systematic).reason
+    reason = assess("eta", 0.85, noise, "likelihood", systematic).reason
     assert ("Step the pedal" not in reason) == sensors
     assert ("Calibrate" in reason) == sensors
 
 
 def test_a_delay_of_zero_is_sound() -> None:
-    assert assess("te_delay", 0.0, 0.0005, "integral").verdict is Verdict.IDENTIFIED
-    assert assess("te_delay", 0.0, 0.05, "integral").verdict is Verdict.NOT_IDENTIFIABLE
+    assert assess("te_delay", 0.0, 0.0005, "likelihood").verdict is Verdict.IDENTIFIED
+    assert assess("te_delay", 0.0, 0.05, "likelihood").verdict is Verdict.NOT_IDENTIFIABLE
 
 
 def test_a_value_outside_its_bounds_is_never_given() -> None:
-    assert assess("J_vehicle", -400.0, 1.0, "integral").value is None
+    assert assess("J_vehicle", -400.0, 1.0, "likelihood").value is None
 
 
 def test_refusal_names_the_experiment() -> None:
-    assert "pedal" in refuse_parameter("te_delay", "integral", "no motion").reason
+    assert "pedal" in refuse_parameter("te_delay", "likelihood", "no motion").reason
 
 
 DRUM = PriorValue(0.05, 0.03)
@@ -88,14 +87,6 @@ def test_what_the_card_states_keeps_a_number_the_better_known_the_more_its_own(
 def test_what_is_impossible_is_withheld_although_the_card_states_it() -> None:
     one = assess_with_prior(("drum.B3", -0.2, 0.002), DRUM, "likelihood with design prior")
     assert one.verdict is Verdict.NOT_IDENTIFIABLE
-
-
-def test_propagation_is_exact_for_a_linear_map() -> None:
-    A = np.array([[1.0, 2.0], [0.5, -1.0]])
-    cov = np.array([[0.04, 0.01], [0.01, 0.09]])
-    mean, out = propagate(lambda x: A @ x, np.array([1.0, 2.0]), cov)
-    assert mean == pytest.approx(A @ [1.0, 2.0])
-    assert out == pytest.approx(A @ cov @ A.T)
 
 
 def test_correlation_of_a_known_parameter_is_zero() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Evidence of both methods, drawn from a given log."""
+"""Evidence of the paper's method, drawn from a given log."""
 
 from __future__ import annotations
 
@@ -40,32 +40,21 @@ def build_appendix(found: Identification) -> list[Section]:
     return [section for section in build_stage_sections(found) if section.collapsed]
 
 
-def test_each_question_shows_both_methods(given: tuple[Identification, ShiftLog]) -> None:
+def test_each_question_has_a_picture(given: tuple[Identification, ShiftLog]) -> None:
     sections = {section.anchor: section.blocks for section in build_appendix(given[0])}
     figures = {
         anchor: sum(isinstance(block, FigureBlock) for block in blocks)
         for anchor, blocks in sections.items()
     }
-    assert figures == {"appendix-inertia": 2, "appendix-load": 2, "appendix-shaft": 2}
+    assert figures == {"appendix-inertia": 1, "appendix-load": 1, "appendix-shaft": 1}
 
 
-@pytest.mark.parametrize("method", [Method.INTEGRAL, Method.PAPER])
-def test_only_the_evidence_of_other_methods_is_collapsed(
-    given: tuple[Identification, ShiftLog], method: Method
+def test_the_evidence_is_collapsed_beside_another_methods_result(
+    given: tuple[Identification, ShiftLog],
 ) -> None:
-    evidence = replace(given[0].evidence, likelihood=None)
-    found = replace(given[0], method=method, evidence=evidence)
-    open_, closed = (
-        [section for section in build_stage_sections(found) if section.collapsed is collapsed]
-        for collapsed in (False, True)
-    )
-    for sections, is_paper in (
-        (open_, method is Method.PAPER),
-        (closed, method is Method.INTEGRAL),
-    ):
-        captions = [b.caption for one in sections for b in one.blocks if isinstance(b, FigureBlock)]
-        assert captions
-        assert all(text.startswith("The paper's") is is_paper for text in captions)
+    assert all(section.collapsed for section in build_stage_sections(given[0]))
+    paper = replace(given[0], method=Method.PAPER)
+    assert not any(section.collapsed for section in build_stage_sections(paper))
 
 
 def test_tables_are_those_of_the_paper(given: tuple[Identification, ShiftLog]) -> None:
@@ -87,11 +76,11 @@ def test_a_doubtful_grid_is_not_marked_as_good(given: tuple[Identification, Shif
 
 def test_a_refused_stage_says_why(given: tuple[Identification, ShiftLog]) -> None:
     found = given[0]
-    (one,) = found.evidence.integral
+    (one,) = found.evidence.paper
     refused = replace(one, ring=None, refusals={"shaft": "no oscillation"})
-    shaft = build_stage_sections(replace(found, evidence=StageResults(integral=(refused,))))[2]
+    shaft = build_stage_sections(replace(found, evidence=StageResults(paper=(refused,))))[2]
     assert [block.items for block in shaft.blocks if isinstance(block, NotesBlock)] == [
-        ["Integral method: no oscillation"]
+        ["The paper's method: no oscillation"]
     ]
 
 

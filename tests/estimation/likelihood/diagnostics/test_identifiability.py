@@ -26,7 +26,7 @@ def test_an_age_at_the_limit_of_the_search_is_not_identified() -> None:
     upper[start.names.index("te_delay")] = limit = made.truth["te_delay"] - SHORT
     fit = fit_local(replace(posed, upper=upper), start)
     assert fit is not None
-    concluded = build_estimates(fit, [made.signals], [made.driveline], {}, EffectPriors(NO_EFFECT))
+    concluded = build_estimates(fit, [made.signals], [made.driveline], EffectPriors(NO_EFFECT))
     age = concluded.estimates["te_delay"]
     assert age.value == pytest.approx(limit)
     assert age.verdict is Verdict.WEAK

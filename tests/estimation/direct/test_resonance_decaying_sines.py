@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from drivetwin.estimation.linear.resonance import Windows, compute_misfits, fit_decaying_sines
+from drivetwin.estimation.direct.resonance import Windows, compute_misfits, fit_decaying_sines
 from tests.support.arrays import FloatArray
 
 

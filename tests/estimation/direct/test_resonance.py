@@ -8,7 +8,7 @@ import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.linear.resonance import fit_resonance
+from drivetwin.estimation.direct.resonance import fit_resonance
 from tests.support.arrays import FloatArray
 
 TIME = np.arange(5.0, 8.0, 0.02)

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from drivetwin.estimation.data.prepare_gears import prepare_gears, prepare_input_speed
-from drivetwin.estimation.linear.inertia_in_gear import estimate_gear_inertias
-from drivetwin.estimation.linear.resonance import Resonance, find_shift_resonance
+from drivetwin.estimation.direct.inertia_in_gear import estimate_gear_inertias
+from drivetwin.estimation.direct.resonance import Resonance, find_shift_resonance
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.shifts.detect import detect_shifts
 from tests.shifts.test_detect_j1939 import recording
