@@ -37,10 +37,10 @@ from benchmarks.estimation.validity import (
 from drivetwin._util.progress import record_stages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
+from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.estimation.likelihood.mechanism import DISABLED, Mechanism
-from drivetwin.estimation.linear.load_balance import AERO
+from drivetwin.estimation.likelihood.mechanism import Mechanism, disable
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.findings import Code
 from drivetwin.vehicle.effects import EffectId
@@ -102,7 +102,7 @@ def make_case(study: str, seed: int) -> MadeLog:
 
 
 @contextmanager
-def disable(variant: str) -> Iterator[tuple[EffectId, ...]]:
+def disable_variant(variant: str) -> Iterator[tuple[EffectId, ...]]:
     """Disable mechanisms inside the block; yield the effects that the card has to switch off.
 
     Nothing admits an effect that is missing, although the log shows it.
@@ -112,18 +112,15 @@ def disable(variant: str) -> Iterator[tuple[EffectId, ...]]:
     off = {Mechanism(name) for name in names if name not in GROUPS}
     off |= MODES if Mechanism.SAMPLING_MODES in off else set()
     off |= {Mechanism.ADMISSION} if effects else set()
-    token = DISABLED.set(frozenset(off))
-    try:
+    with disable(off):
         yield tuple(effects)
-    finally:
-        DISABLED.reset(token)
 
 
 def run_variant(study: str, seed: int, variant: str) -> Outcome:
     """Identify the log of a seed without the mechanisms and groups of a variant."""
     made = make_case(study, seed)
     found, failure = None, ""
-    with disable(variant) as effects, record_stages() as clock:
+    with disable_variant(variant) as effects, record_stages() as clock:
         try:
             found = identify_validated(made.log, withhold(made.card, *effects))
         except DrivetwinError as error:

@@ -108,7 +108,7 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
         sessions = Sessions(Folder.from_path(folder))
         session = sessions.get(sessions.create())
         session.open(session.get_folder_source(log.name), session.get_folder_source(card.name))
-        session.identify([Method.PAPER, Method.INTEGRAL])
+        session.identify([Method.PAPER, Method.LIKELIHOOD], is_quick=True)
         while session.job is not None:
             session.collect_job_results()
             time.sleep(0.05)

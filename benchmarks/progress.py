@@ -173,7 +173,7 @@ def run_joint(folder: Path) -> Iterator[tuple[str, Timeline]]:
 def run_calibrations(folder: Path) -> Iterator[tuple[str, Timeline]]:
     """Calibrate a shift, trace its front, and calibrate a map."""
     with record_stages():  # not recorded: a single identification is no measurement
-        twin = make_bench(folder, "paper_steps").identify(Method.INTEGRAL).twin
+        twin = make_bench(folder, "paper_steps").identify(Method.LIKELIHOOD).twin
     calibrated: list[Calibration] = []
     request, grid = Request(gears=("2", "3")), Grid((1000.0, 1400.0), (160.0, 190.0))
     work = partial(_collect, calibrated, partial(run_calibration, twin, request))

@@ -93,7 +93,7 @@ ENTRIES = (
         "Shared values, spread over units and outliers from the logs of several vehicles.",
         (
             *(f"drivetwin synth --seed {seed} -o logs/unit_{seed}/shift.csv" for seed in range(8)),
-            "drivetwin fleet logs --vehicle logs/unit_0/shift.card.toml --method integral -o store",
+            "drivetwin fleet logs --vehicle logs/unit_0/shift.card.toml --quick -o store",
             "drivetwin fleet report store",
         ),
         "store/report.html",

@@ -240,28 +240,22 @@ def draw_effect() -> str:
 
 @dataclass(frozen=True)
 class Case:
-    """A section of docs/accuracy.md: (RMSE over bound, coverage [%]) of each row by method."""
+    """A section of docs/accuracy.md: (RMSE over bound, coverage [%]) of each row."""
 
     title: str
     commit: str
-    rows: Mapping[str, Sequence[Point]]
+    rows: Sequence[Point]
 
 
 def read_accuracy(page: str) -> list[Case]:
     """Read the sections with a table of bounds."""
     cases = []
     for section in page.split("\n## ")[1:]:
-        found = re.findall(
-            r"^\|.*\| (integral|likelihood) \|.*\| (\S+) \| (\d+) % \|$", section, re.M
-        )
+        is_study = "| RMSE/bound | coverage |" in section
+        found = re.findall(r"^\|.*\| (\S+) \| (\d+) % \|$", section, re.M) if is_study else []
         commit = re.search(r"^Code of commit (\w{8})", section, re.M)
         if found and commit:
-            rows = {
-                method: [
-                    (float(ratio), float(share)) for one, ratio, share in found if one == method
-                ]
-                for method in ("integral", "likelihood")
-            }
+            rows = [(float(ratio), float(share)) for ratio, share in found]
             cases.append(Case(section.partition("\n")[0], commit[1], rows))
     return cases
 
@@ -269,7 +263,7 @@ def read_accuracy(page: str) -> list[Case]:
 def draw_accuracy() -> str:
     """Draw error over bound and coverage of every table row of docs/accuracy.md."""
     cases = read_accuracy((FOLDER.parent / "accuracy.md").read_text(encoding="utf-8"))
-    step, top, width = 62.0, 62.0, 300.0
+    step, top, width = 46.0, 40.0, 300.0
     bottom = top + step * len(cases)
 
     def place_ratio(value: float) -> float:
@@ -295,19 +289,14 @@ def draw_accuracy() -> str:
         draw_text((place_ratio(1.0), bottom + 26), "error (RMSE) over Cramér-Rao bound", size=12),
         draw_text((place_share(95.0), bottom + 26), "coverage of 95 % intervals [%]", size=12),
     ]
-    for number, method in enumerate(("likelihood", "integral")):
-        parts.append(_draw_dot((24 + 150 * number, 16), COLOURS[number]))
-        parts.append(draw_text((34 + 150 * number, 20), method, anchor="start", size=12))
     for row, case in enumerate(cases):
         y = top + step * row
         title = f"{case.title.replace('_', ' ')} ({case.commit})"
         parts.append(draw_text((20, y - 4), title, anchor="start", size=12))
-        for number, method in enumerate(("likelihood", "integral")):
-            level = y + 10 + 16 * number
-            for ratio, share in case.rows[method]:
-                parts.append(_draw_dot((place_ratio(ratio), level), COLOURS[number]))
-                parts.append(_draw_dot((place_share(share), level), COLOURS[number]))
-    return build_page(720, bottom + 40, parts, "Error over bound and coverage of the estimators")
+        for ratio, share in case.rows:
+            parts.append(_draw_dot((place_ratio(ratio), y + 10), COLOURS[0]))
+            parts.append(_draw_dot((place_share(share), y + 10), COLOURS[0]))
+    return build_page(720, bottom + 40, parts, "Error over bound and coverage of the estimator")
 
 
 def _draw_dot(at: Point, colour: str) -> str:

@@ -13,11 +13,11 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.estimation.study import START_INERTIA, fit_likelihood, read_fit
+from benchmarks.estimation.study import fit_likelihood, read_fit
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.linear.estimates import apply_sensor_error
-from drivetwin.estimation.linear.pipeline import identify_shift
+from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.support.bench import Bench, Knowledge, record_bench
 
@@ -95,7 +95,26 @@ def _fit_one(
     made: Callable[[], Scenario], disturb: tuple[str, SensorTolerance], seed: int
 ) -> dict[str, float]:
     bench = _remove_drums(record_bench(made(), seed, KNOW))
-    return _fit(replace(bench, signals=apply_sensor_error(bench.signals, *disturb)))
+    return _fit(replace(bench, signals=_apply_sensor_error(bench.signals, *disturb)))
+
+
+def _apply_sensor_error(signals: ShiftSignals, role: str, error: SensorTolerance) -> ShiftSignals:
+    """Copy the signals with the gain and offset of `error` applied to one sensor."""
+
+    def change(one: MeasuredSignal) -> MeasuredSignal:
+        return replace(one, values=one.values * (1.0 + error.gain) + error.offset)
+
+    name = get_pressure_element(role)
+    if name is not None:
+        pressures = {**signals.pressures, name: change(signals.pressures[name])}
+        return replace(signals, pressures=pressures)
+    match role:
+        case "engine_torque":
+            return replace(signals, engine_torque=change(signals.engine_torque))
+        case "output_torque":
+            return replace(signals, output_torque=change(signals.output_torque))
+        case _:
+            return signals
 
 
 def _remove_drums(bench: Bench) -> Bench:
@@ -112,5 +131,5 @@ def _remove_drums(bench: Bench) -> Bench:
 
 
 def _fit(bench: Bench) -> dict[str, float]:
-    fit = fit_likelihood(bench, identify_shift(bench.signals, bench.driveline, START_INERTIA))
+    fit = fit_likelihood(bench)
     return {**{n: value for n, (value, _) in read_fit(fit, bench).items()}, "chi2": fit.chi2}

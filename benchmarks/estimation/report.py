@@ -14,32 +14,31 @@ from benchmarks.estimation.study import Sample, Study
 from benchmarks.estimation.unseen import HALF, Log, collect
 from drivetwin._util.arrays import FloatArray
 
-HEAD = """# Accuracy of the estimators
+HEAD = """# Accuracy of the estimator
 
-![Error over bound and coverage of each parameter, by case and method](img/accuracy.svg)
+![Error over bound and coverage of each parameter by case](img/accuracy.svg)
 
 Each dot is a row of the tables below, with the commit of its section
-(`python -m tools.theory_figures`). The likelihood method is the default; its errors are close
-to the bound. Those of the integral method are larger, and far below the bound only in c_o, f_d and
-ζ. Dots inside the grey band agree with 95 % coverage.
+(`python -m tools.theory_figures`). The errors of the likelihood method are close to the bound. Dots
+inside the grey band agree with 95 % coverage.
 
 Written by `make accuracy` from noise realisations of the virtual dynamometer, others in every case.
 The bound is that of Cramér and Rao: the Fisher information at the truth, with the noise of
 outputs and inputs and the priors of the card in it, computed by disturbing every input sample of
-the simulation; nothing of it is taken from the fits. It takes for known whether signals are
+the simulation. Nothing of it is taken from the fits. It takes for known whether signals are
 samples or means, which the fits decide; that costs the delay of the engine torque some of its
 bound. Design values that the card knows only roughly are drawn about the truth. Coverage is that of
 the stated 95 % intervals from noise.
 From n realisations RMSE/bound has a standard error of 1/√(2n), coverage one of √(475/n) %.
-Each section names the code that it is from; one that names none is older than the choice between
+Each section names the code that it is from. One that names none is older than the choice between
 samples and means, curves and lines, and than the off-going element's own drop of friction.
 """
 
 STARTS = """## From bad start values
 
-The linear method is off; every start value is drawn evenly within ± {off:.0f} % of the truth, those
-of P0 are the card's. *right* means that every parameter lies inside the 95 % interval of the fit
-that starts at the truth; a *refused* try says that it failed.
+Every start value is drawn evenly within ± {off:.0f} % of the truth, those of P0 are the card's.
+*right* means that every parameter lies inside the 95 % interval of the fit that starts at the
+truth; a *refused* try says that it failed.
 
 | tries | right | refused | wrong |
 |---|---|---|---|
@@ -154,18 +153,15 @@ def format_faults(shifts: Sequence[Shift], count: int) -> str:
 
 def format_study(study: Study, text: str) -> str:
     """Return the section of a study; `text` describes the design data of the card."""
-    head = ("parameter", "bound", "method", "bias", "std", "RMSE/bound", "coverage")
+    head = ("parameter", "bound", "bias", "std", "RMSE/bound", "coverage")
     lines = [f"## {study.name}: {text}", "", *_format_header(*head)]
-    for method, by_name in study.samples.items():
-        for name, samples in by_name.items():
-            if study.bounds.get(name, 0.0) > 0.0:
-                lines.append(_format_estimate(study, method, name, samples))
-    coverage = [
-        _compute_coverage(s) for n, s in study.samples["likelihood"].items() if n in study.bounds
-    ]
+    for name, samples in study.samples.items():
+        if study.bounds.get(name, 0.0) > 0.0:
+            lines.append(_format_estimate(study, name, samples))
+    coverage = [_compute_coverage(s) for n, s in study.samples.items() if n in study.bounds]
     lines += [
         "",
-        f"Likelihood, {study.count} realisations: {study.failures['likelihood']} fits failed; "
+        f"{study.count} realisations: {study.failures} fits failed; "
         f"RMSE/bound is {max(_compute_ratios(study)):.2f} at most; coverage is "
         f"{100 * np.mean(coverage):.1f} % on average, {100 * min(coverage):.1f} % at least.",
         "",
@@ -174,24 +170,21 @@ def format_study(study: Study, text: str) -> str:
 
 
 def _compute_ratios(study: Study) -> list[float]:
-    """Return RMSE over bound of every parameter of the likelihood method."""
-    bounded = {
-        n: s for n, s in study.samples["likelihood"].items() if study.bounds.get(n, 0.0) > 0.0
-    }
+    """Return RMSE over bound of every parameter."""
+    bounded = {n: s for n, s in study.samples.items() if study.bounds.get(n, 0.0) > 0.0}
     return [
         float(np.sqrt(np.mean([one.error**2 for one in samples])) / study.bounds[name])
         for name, samples in bounded.items()
     ]
 
 
-def _format_estimate(study: Study, method: str, name: str, samples: list[Sample]) -> str:
+def _format_estimate(study: Study, name: str, samples: list[Sample]) -> str:
     errors = np.array([s.error for s in samples])
     truth, bound = study.truth[name], study.bounds[name]
     scale, unit = (1e3, "ms") if name == "te_delay" else (100.0 / truth, "%")
     return _format_row(
         name,
         f"{scale * bound:.3f} {unit}",
-        method,
         f"{scale * errors.mean():+.3f}",
         f"{scale * errors.std():.3f}",
         f"{np.sqrt(np.mean(errors**2)) / bound:.2f}",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Outcomes of the likelihood method from bad start values, without the linear method."""
+"""Outcomes of the likelihood method from bad start values."""
 
 from __future__ import annotations
 

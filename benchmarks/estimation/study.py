@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Monte Carlo of one scenario: errors and stated deviations of each method, and the bound."""
+"""Monte Carlo of one scenario: errors, stated deviations and the bound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from benchmarks.estimation.bound import compute_bound
 from drivetwin._util.arrays import FloatArray
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.estimation.data.shift_data import DesignData, ShiftSignals
+from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
@@ -26,8 +27,6 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
 )
-from drivetwin.estimation.linear.friction_points import evaluate_stribeck
-from drivetwin.estimation.linear.pipeline import IntegralShift, identify_shift
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
@@ -35,7 +34,6 @@ from tests.support.bench import Bench, Knowledge, record_bench
 
 SLIPS = {f"mu at {slip:g} rad/s": slip for slip in (10.0, 30.0, 50.0)}
 """Slips [rad/s] at which the friction coefficient is compared, by the name in the tables."""
-START_INERTIA = 10.0
 
 
 @dataclass(frozen=True)
@@ -48,29 +46,25 @@ class Sample:
 
 @dataclass(frozen=True)
 class Study:
-    """`samples[method][parameter]` of `count` realisations, the truth and the bound by parameter,
-    failures by method."""
+    """`samples` of `count` realisations, truth and bound by parameter; number of failed fits."""
 
     name: str
     count: int
     truth: Mapping[str, float]
     bounds: Mapping[str, float]
-    samples: Mapping[str, Mapping[str, list[Sample]]]
-    failures: Mapping[str, int]
+    samples: Mapping[str, list[Sample]]
+    failures: int
 
 
 def run_study(scenario: Scenario, know: Knowledge, seeds: Sequence[int]) -> Study:
-    """Fit the noise realisations of `seeds` by the linear and the likelihood method."""
+    """Fit the noise realisations of `seeds` by the likelihood method."""
     truth = build_truth(record_bench(scenario, 0, know, noise=0.0))
-    samples: dict[str, dict[str, list[Sample]]] = {"integral": {}, "likelihood": {}}
-    failures = dict.fromkeys(samples, 0)
+    samples: dict[str, list[Sample]] = {}
+    failures = 0
     with ProcessPoolExecutor() as pool:
-        for linear, best in pool.map(partial(_fit_both, scenario, know), seeds):
-            _collect(samples["integral"], truth, linear)
-            if best is None:
-                failures["likelihood"] += 1
-            else:
-                _collect(samples["likelihood"], truth, best)
+        for found in pool.map(partial(_fit_one, scenario, know), seeds):
+            failures += not found
+            _collect(samples, truth, found)
     return Study(
         scenario.name, len(seeds), truth, compute_bounds(scenario, know), samples, failures
     )
@@ -80,21 +74,30 @@ Estimates = dict[str, tuple[float, float]]
 """Value and standard deviation by parameter."""
 
 
-def _fit_both(scenario: Scenario, know: Knowledge, seed: int) -> tuple[Estimates, Estimates | None]:
-    """Fit one realisation by both methods; None if the likelihood method fails."""
+def _fit_one(scenario: Scenario, know: Knowledge, seed: int) -> Estimates:
+    """Fit one realisation; empty if that fails."""
     bench = record_bench(scenario, seed, know)
-    linear = identify_shift(bench.signals, bench.driveline, START_INERTIA)
     try:
-        best = read_fit(fit_likelihood(bench, linear), bench)
+        return read_fit(fit_likelihood(bench), bench)
     except IdentificationError:
-        best = None
-    return _read_linear(linear), best
+        return {}
 
 
-def fit_likelihood(bench: Bench, linear: IntegralShift) -> LikelihoodFit:
-    """Fit by the likelihood method, started from the linear fit, as `identify` does."""
-    law = bench.run.scenario.model.loss_law
-    guess = estimate_initial_values([linear], [bench.driveline])
+def compute_guess(bench: Bench) -> dict[str, float]:
+    """Return the initial value of every unknown, as `identify` computes it.
+
+    The design ranges reach from half to twice the truth.
+    """
+    model = bench.run.scenario.model
+    inertia = model.J1 * model.eta + model.J2e
+    engine, vehicle = ((0.5 * one, 2.0 * one) for one in (inertia, model.J_v))
+    design = DesignData(model.loss_law, model.i_f, engine, vehicle)
+    return estimate_initial_values([bench.signals], [bench.driveline], design)
+
+
+def fit_likelihood(bench: Bench) -> LikelihoodFit:
+    """Fit by the likelihood method, as `identify` does."""
+    law, guess = bench.run.scenario.model.loss_law, compute_guess(bench)
     return select_model([bench.signals], [bench.driveline], law, guess, EffectPriors())[0]
 
 
@@ -185,27 +188,11 @@ def propagate(
     found = {name: (value, float(np.sqrt(v))) for (name, value), v in pairs}
     element = problem.terms[0].structure.driveline.oncoming.name
     index = [point.names.index(f"{element}.{key}") for key in LAW]
-    found |= _propagate_friction(point.values[index], covariance[np.ix_(index, index)], slips)
+    mu, by_law = evaluate_stribeck(point.values[index], np.array(list(slips.values())))
+    std = np.sqrt(np.einsum("pn,pq,qn->n", by_law, covariance[np.ix_(index, index)], by_law))
+    found |= dict(zip(slips, zip(mu.tolist(), std.tolist(), strict=True), strict=True))
     if "te_delay" not in point.names:
         found.pop("te_delay", None)
-    return found
-
-
-def _propagate_friction(
-    law: FloatArray, covariance: FloatArray, slips: Mapping[str, float]
-) -> Estimates:
-    """Return μ and its standard deviation from a Stribeck law (4,) and its covariance (4, 4)."""
-    mu, by_law = evaluate_stribeck(law, np.array(list(slips.values())))
-    std = np.sqrt(np.einsum("pn,pq,qn->n", by_law, covariance, by_law))
-    return dict(zip(slips, zip(mu.tolist(), std.tolist(), strict=True), strict=True))
-
-
-def _read_linear(shift: IntegralShift) -> Estimates:
-    std = np.sqrt(np.diag(shift.covariance))
-    found = {n: (float(v), float(s)) for n, v, s in zip(shift.ids, shift.values, std, strict=True)}
-    if shift.friction is not None:
-        fit = shift.friction.fit
-        found |= _propagate_friction(fit.theta, fit.covariance[:4, :4], SLIPS)
     return found
 
 

@@ -20,13 +20,13 @@ from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
+from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, build_record
 from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET
 from drivetwin.estimation.likelihood.priors import split_spans
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
-from drivetwin.estimation.linear.load_balance import AERO
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.method import DEFAULT_METHOD

@@ -2,7 +2,7 @@
 """Shift of the paper: `Model.fit` beside the likelihood fit of `identify`, on the same noise.
 
 The likelihood fit is that without effects: one search, no selection of the load or of the sampling
-modes. Both start from the linear estimates and have the same priors, except for the off-going
+modes. Both start from the same direct estimates and have the same priors, except for the off-going
 element: the likelihood fit gives it a level and a rise of its own, `Model.fit` its own mu_s. The
 delay of the engine torque is minus the delay of the input.
 """
@@ -15,17 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.estimation.study import SLIPS, START_INERTIA, propagate
+from benchmarks.estimation.study import SLIPS, compute_guess, propagate
 from benchmarks.fit.report import format_header, format_row
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.data.shift_record import RECORD
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
-from drivetwin.estimation.linear.pipeline import identify_shift
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance
@@ -99,8 +97,7 @@ def fit_both(seed: int) -> tuple[Fitted, Fitted]:
     scenario = load_scenario(ScenarioName.PAPER_STEPS)
     bench = record_bench(scenario, seed, Knowledge())
     began = time.process_time()
-    linear = identify_shift(bench.signals, bench.driveline, START_INERTIA)
-    guess = estimate_initial_values([linear], [bench.driveline])
+    guess = compute_guess(bench)
     law = scenario.model.loss_law
     problem, start = build_problem([bench.signals], [bench.driveline], law, guess)
     first = time.process_time() - began

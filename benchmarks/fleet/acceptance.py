@@ -17,7 +17,6 @@ from pathlib import Path
 from time import perf_counter
 
 from drivetwin.cli.fleet_view import show_progress
-from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.events import Event, Settled
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet
@@ -48,7 +47,7 @@ def run_made_fleet(folder: Path, store: Path) -> dict[str, Settled]:
         sources=Sources([str(folder)]),
         rules=read_rules(folder / "rules.toml"),
         store=store,
-        method=Method.INTEGRAL,
+        quick=True,
     )
     started = perf_counter()
     with show_progress(as_json=False) as show:

@@ -27,7 +27,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from drivetwin.estimation.result.method import Method
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.events import Event, Settled, Started
 from drivetwin.fleet.pool import ONE_THREAD
@@ -116,7 +115,7 @@ def _run(logs: Path, function: str, workers: int, cluster: bool) -> Ran:
             sources=Sources([str(logs)]),
             rules=read_rules(logs / "rules.toml"),
             store=store,
-            method=Method.INTEGRAL,
+            quick=True,
             workers=workers,
             scheduler=scheduler,
             function=function,
