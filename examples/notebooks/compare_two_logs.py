@@ -17,7 +17,7 @@ for name, seed in (("monday", "1"), ("tuesday", "2")):
     card = drivetwin.load_card(f"{name}.card.toml")
     logs[name] = drivetwin.read_log(f"{name}.csv", card)
     found = drivetwin.detect_shifts(logs[name], card)
-    results[name] = drivetwin.identify(logs[name], card, found, drivetwin.Method.INTEGRAL)
+    results[name] = drivetwin.identify(logs[name], card, found)
     twins[name] = drivetwin.build_twin(results[name], card)
 
 # %% Every parameter, and by how many standard deviations the two are apart.

@@ -16,7 +16,7 @@ main(["synth", "-o", "shift.csv"])
 card = drivetwin.load_card("shift.card.toml")
 log = drivetwin.read_log("shift.csv", card)
 found = drivetwin.detect_shifts(log, card)
-result = drivetwin.identify(log, card, found, drivetwin.Method.INTEGRAL)
+result = drivetwin.identify(log, card, found)
 twin = drivetwin.build_twin(result, card)
 shift = found.shifts[0]
 twin
