@@ -44,7 +44,7 @@ LOAD_LABELS = WlseLabels(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Stages:
     """The paper's stages on one shift; `by` names the method and, of several shifts, which."""
 
