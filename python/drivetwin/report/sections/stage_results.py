@@ -99,10 +99,10 @@ def _build_sections(paper: Sequence[_Stages]) -> list[Section]:
 
 def _collect_stages(found: Identification) -> list[_Stages]:
     """Collect the stages of the paper's method, with the shift names if there are several."""
-    method, stages = "The paper's method", found.evidence.paper
+    stages = found.evidence.paper
     names = [f"Shift {name}, the paper's method" for name in make_shift_labels(found.shifts)]
     if len(stages) < 2 or len(stages) != len(names):
-        names = [method] * len(stages)
+        names = ["The paper's method"] * len(stages)
     return [_Stages(name, one) for name, one in zip(names, stages, strict=True)]
 
 
