@@ -14,9 +14,10 @@ from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.result import ModelFit
+from drivetwin.fit.synthesize import ModelName
 from drivetwin.fit.unknown import Unknown
 from drivetwin.simulation.dual_clutch import Signal
-from tests.support.fits import TWO_SIDED, make_two_sided
+from tests.support.fits import TWO_SIDED, make_log, make_two_sided
 
 TRUTH = {
     "gain.torque": 1.03,
@@ -154,3 +155,18 @@ def test_the_start_of_a_search_takes_the_gain_of_an_output_into_account() -> Non
     low, high = found.intervals["gain.left"]
     assert low < 30.0 / np.pi < high
     assert found.chi2 < 1.1
+
+
+def test_an_offset_of_a_pressure_is_known_as_well_as_the_fill_pressure() -> None:
+    """The core has derivatives by one of them alone; a clutch locks on the way."""
+    made = make_log(ModelName.ENGINE_START)
+    exact = {name: Tolerance(exact=True) for name in ("K0.p0", "K0.gain")}
+    found = {}
+    for name, value in (("K0.p0", 8e4), ("offset.K0", 0.0)):
+        unknowns = {**made.model.unknowns, name: Unknown(value, 1e4)}
+        model = replace(made.model, unknowns=unknowns, tolerances=exact)
+        found[name] = fit_network(model, [made.recording])
+    fill, offset = (one.values[name] for name, one in found.items())
+    std, own = (one.std[name] for name, one in found.items())
+    assert own == pytest.approx(std, rel=0.02)
+    assert offset == pytest.approx(8e4 - fill, abs=0.1 * std)

@@ -134,7 +134,7 @@ class Plant:
             if one.name == name:
                 size = max(abs(one.start), one.spread or 0.0, *sizes, 1e-6)
                 return _SHARE * (1.0 if one.is_positive else size)
-        return _STEP
+        return _SHARE
 
     def build_task(
         self, point: ParameterVector, inputs: Mapping[str, Signal], time: FloatArray
@@ -227,5 +227,8 @@ def _is_common(place: Place) -> bool:
     return not (is_own and place.schema.differentiable)
 
 
-_SHARE, _STEP = 1e-3, 0.1
-"""Steps of a difference of runs: of an unknown [ratio], of a fixed number [standard deviations]."""
+_SHARE = 1e-6
+"""Step of a difference of runs over an unknown, or over the deviation of a fixed number [ratio].
+
+It is the root of the truncation error of a run. A larger step moves events past samples, whose
+differences are then no derivatives."""
