@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.profile_likelihood import Profile, trace_profile
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
-from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.likelihood.fit import compute_covariance, invert_information
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.fit.profile import HeldCoordinate
 from drivetwin.fit.result import ModelFit
-from drivetwin.fit.term import Problem
 
 REPEATS = 4
 """Recordings in place of one that an improvement assumes."""
@@ -86,7 +84,8 @@ def compute_profile(found: ModelFit, unknown: str) -> Profile:
     if unknown not in names:
         raise InputError(f"the fit has no unknown {unknown!r}", f"choose one of {', '.join(names)}")
     one = found.sought[names.index(unknown)]
-    profile = trace_profile(_HeldCoordinate(found, names.index(unknown), unknown))
+    covariance = compute_covariance(found.problem, found.normal, found.chi2)
+    profile = trace_profile(HeldCoordinate(found.minimum, covariance, names.index(unknown)))
     if not one.is_positive:
         return profile
     (low, high), (least, most) = profile.interval, profile.linear
@@ -97,46 +96,3 @@ def compute_profile(found: ModelFit, unknown: str) -> Profile:
         interval=(float(np.exp(low)), float(np.exp(high))),
         linear=(one.to_value(least), one.to_value(most)),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _HeldCoordinate:
-    """Coordinate of an unknown, by its place."""
-
-    found: ModelFit
-    place: int
-    parameter: str
-
-    @property
-    def problem(self) -> Problem:
-        return self.found.problem
-
-    @property
-    def point(self) -> ParameterVector:
-        return self.found.minimum.point
-
-    @property
-    def cost(self) -> float:
-        return self.found.cost
-
-    @property
-    def estimate(self) -> float:
-        return float(self.point.values[self.place])
-
-    @property
-    def std(self) -> float:
-        return float(np.sqrt(self.found.covariance[self.place, self.place]))
-
-    @property
-    def unit(self) -> float:
-        """Rise of Q that counts as one: the variance over that by the sensors' noise."""
-        inverse = invert_information(self.found.normal.information)
-        return float(self.std**2 / inverse[self.place, self.place])
-
-    def compute_value(self, point: ParameterVector) -> float:
-        return float(point.values[self.place])
-
-    def compute_gradient(self, point: ParameterVector) -> FloatArray:
-        gradient = np.zeros(len(point.names))
-        gradient[self.place] = 1.0
-        return gradient

@@ -35,6 +35,7 @@ from drivetwin.findings import Code, Finding, Number, Severity, report
 from drivetwin.fit.expression import ResolvedNumbers
 from drivetwin.fit.fixed_numbers import FixedNumber, Source, Tolerance
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.profile import trace_slow, widen
 from drivetwin.fit.search import FoundMinimum, RefinedStart
 from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import PlacedNumber, SoughtNumber
@@ -152,10 +153,11 @@ class ModelFit(EstimatesMixin):
 
     `estimates`, `values`, standard deviations `std` [SI] and 95 % `intervals` by name of the
     unknown, and after these of the functions of unknowns; `values` and `std` whatever the verdicts.
-    Intervals of a positive number are by its logarithm. `starts` are the minima that the refined
-    starts led to, `agreeing` the number of those in the best one. `agreement` compares the
-    simulation with each recording, by output. `moved` are the numbers beside the unknowns that are
-    coordinates of the minimum.
+    Intervals of a positive number are by its logarithm, and by the profile where Q rises more
+    slowly than its expansion; `covariance` (p, p) is widened to these. `starts` are the minima that
+    the refined starts led to, `agreeing` the number of those in the best one. `agreement` compares
+    the simulation with each recording, by output. `moved` are the numbers beside the unknowns that
+    are coordinates of the minimum.
     """
 
     model: NetworkModel
@@ -295,13 +297,17 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
     minimum, sought = found.result, numbers.sought
     problem, chi2 = minimum.problem, _compute_chi2(minimum)
     covariance = compute_covariance(problem, minimum.normal, chi2)
+    is_explained = chi2 <= FIT_GATE.plausible_chi2 and not found.is_limited
+    profiles = trace_slow(minimum, covariance, len(sought)) if is_explained else {}
+    covariance, by_profile = widen(covariance, profiles, problem.prior)
     estimates, values, spreads, intervals = {}, {}, {}, {}
-    for one, coordinate, std in _iterate_coordinates(numbers, minimum.point, covariance):
+    listed = _iterate_coordinates(numbers, minimum.point, covariance)
+    for k, (one, coordinate, std) in enumerate(listed):
         name, value = one.name, one.to_value(coordinate)
         values[name], spreads[name] = value, value * std if one.is_positive else std
         estimates[name] = _judge(one, value, spreads[name])
-        low, high = (one.to_value(coordinate + side * Z95 * std) for side in (-1.0, 1.0))
-        intervals[name] = (low, high)
+        low, high = by_profile.get(k, (coordinate - Z95 * std, coordinate + Z95 * std))
+        intervals[name] = (one.to_value(low), one.to_value(high))
     agreement = tuple(term.compare(minimum.point) for term in problem.terms)
     failures = tuple(find_failures(problem.terms, minimum.normal.residuals, agreement, chi2))
     doubts = find_doubts(problem.terms, agreement, failures, chi2)
