@@ -71,3 +71,18 @@ def test_samples_that_are_means_are_compared_with_means() -> None:
         assert abs(found.values[name] - value) < 3.0 * found.std[name], name
         assert found.std[name] < 0.002 * value, name
     assert fit(Samples.INSTANT).chi2 > 10.0
+
+
+def test_two_levels_of_an_input_are_those_of_a_switch() -> None:
+    """A torque of 0 and 60 is no torque that is rounded to 60."""
+    time = np.arange(0.0, 8.0, 0.005)
+    torque = Signal(time, np.where(np.sin(2.0 * np.pi * time) > 0.0, 60.0, 0.0))
+    speed = build_stand(torque).simulate(time)["speed", "a"]
+    speed = speed + 0.02 * np.random.default_rng(5).standard_normal(time.size)
+    unknowns = {name: Unknown(1.3 * value) for name, value in TRUTH.items()}
+    recording = Recording({"motor": torque}, {"w": Measured(time, speed)})
+    found = build_stand(torque).fit(recording, unknowns, {"w": ("speed", "a")}, seed=0)
+    assert found.chi2 == pytest.approx(1.0, abs=0.15)
+    for name, value in TRUTH.items():
+        assert abs(found.values[name] - value) < 3.0 * found.std[name], name
+        assert found.std[name] < 0.001 * value, name

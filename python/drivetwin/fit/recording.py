@@ -33,6 +33,8 @@ from drivetwin.simulation.dual_clutch import Signal
 
 _MIN_SAMPLES = 20
 """Fewest samples of a compared quantity."""
+_LEAST_LEVELS = 3
+"""Fewest levels of a rounded quantity."""
 
 
 class Samples(StrEnum):
@@ -76,8 +78,7 @@ class Measured:
         least = RECORD.min_noise * float(np.ptp(self.values))
         found = self.sigma
         if found is None:
-            rounding = float(estimate_rounding_step(self.values)) / np.sqrt(12.0)
-            found = max(estimate_white_noise(self.values), rounding)
+            found = max(estimate_white_noise(self.values), self._find_step() / np.sqrt(12.0))
         return float(max(found, least, np.finfo(float).tiny))
 
     def compute_variance(self) -> FloatArray:
@@ -89,7 +90,13 @@ class Measured:
     def find_rounding(self) -> Quantization | None:
         """Find the rounding of the samples; None where noise dithers it."""
         signal = MeasuredSignal(self.time, self.values, self.get_noise())
-        return estimate_quantization(signal, estimate_rounding_step(self.values))
+        return estimate_quantization(signal, self._find_step())
+
+    def _find_step(self) -> float:
+        """Find the step of rounding; 0 for two levels, which are those of a switch."""
+        if np.unique(self.values).size < _LEAST_LEVELS:
+            return 0.0
+        return float(estimate_rounding_step(self.values))
 
 
 @dataclass(frozen=True, eq=False)

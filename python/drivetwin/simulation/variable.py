@@ -81,7 +81,10 @@ def exp(number: float) -> float:
         value = math.exp(number)
     except OverflowError:
         value = math.inf
-    return Variable(value, value * number.slopes) if isinstance(number, Variable) else value
+    if not isinstance(number, Variable):
+        return value
+    with np.errstate(invalid="ignore"):  # no slope of an infinite value where the number has none
+        return Variable(value, value * number.slopes)
 
 
 def log(number: float) -> float:
