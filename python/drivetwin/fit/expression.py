@@ -144,7 +144,7 @@ def _read_formula(name: str, one: Expression, unknowns: Mapping[str, Unknown]) -
     for each in one.of:
         if each not in unknowns:
             hint = suggest_spelling(each, unknowns)
-            raise InputError(f"{name}: {each!r} is no unknown{hint}", "name the unknowns in `of`")
+            raise InputError(f"{name}: {each!r} is no unknown{hint}", "name unknowns in 'of'")
     return Formula(tuple(one.of), one.formula)
 
 
