@@ -19,10 +19,6 @@ class Schedule:
 
     knots: Mapping[str, Knots]
 
-    def get_last_value(self, name: str) -> float:
-        """Return the last value decided for an input."""
-        return self.knots[name][-1][1]
-
     def add_knots(self, name: str, start: float, *points: tuple[float, float]) -> Schedule:
         """Keep an input until `start` [s], then lead it through `points` (time after start, value).
 

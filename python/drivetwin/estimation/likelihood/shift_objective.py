@@ -36,7 +36,6 @@ from drivetwin.estimation.optimize.objective import (
     NormalEquations,
     ParameterVector,
     find_acting,
-    join_columns,
     place_columns,
 )
 from drivetwin.estimation.regression.errors_in_variables import Prior
@@ -219,13 +218,6 @@ class ShiftTerm:
         name."""
         return self.observe(point, self.compute_response(point, run).propagate_inputs(disturbance))
 
-    def respond_to_forces(
-        self, point: ParameterVector, run: Trajectory, force: FloatArray
-    ) -> FloatArray:
-        """Compute the change (n,) of the simulated samples by torques (N-1, 4) on the speeds of
-        engine, output and wheel."""
-        return self.observe(point, self.compute_response(point, run).propagate_forces(force))
-
     def observe(self, point: ParameterVector, z: FloatArray) -> FloatArray:
         """Project disturbances z (N, 4) of the state onto the compared samples (n,)."""
         model = self.structure.build_model(point)
@@ -379,27 +371,6 @@ class ColumnProducts:
     cross: FloatArray
     pull: FloatArray
     weighted: tuple[FloatArray, ...]
-
-    def extend_expansion(
-        self, minimum: NormalEquations, precision: FloatArray, known: FloatArray | float = 0.0
-    ) -> NormalEquations:
-        """The expansion at a `minimum` with the effects as q more unknowns, behind its own.
-
-        Of these `precision` (q,) is known beforehand, about zero, from which they are `known` (q,)
-        away already.
-        """
-        information = np.block(
-            [[minimum.information, self.cross], [self.cross.T, self.own + np.diag(precision)]]
-        )
-        data = np.block([[minimum.data, self.cross], [self.cross.T, self.own]])
-        pairs = zip(minimum.regressors, self.weighted, strict=True)
-        return replace(
-            minimum,
-            gradient=np.concatenate([np.zeros(len(self.cross)), precision * known - self.pull]),
-            information=information,
-            data=data,
-            regressors=tuple(join_columns(*both) for both in pairs),
-        )
 
 
 def compute_column_products(

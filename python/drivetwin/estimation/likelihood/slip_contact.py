@@ -33,10 +33,6 @@ class Contact:
     per_mu: FloatArray
     row: FloatArray
 
-    def compute_forces(self, torques: FloatArray) -> FloatArray:
-        """Forces (N-1, 4) on the speeds by torques (N-1,) that act against slip."""
-        return -torques[:, None] * self.row
-
 
 def evaluate_contact(
     term: ShiftTerm, point: ParameterVector, run: Trajectory, name: str

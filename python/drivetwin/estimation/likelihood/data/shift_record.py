@@ -198,13 +198,6 @@ class ShiftRecord(ComparedOutputs):
         by_step = build_interpolation(torque, middle, (0, torque.size))
         return csr_array(by_step @ self._build_torque_map(self.of_speeds))
 
-    def map_torque_noise(self, noise: FloatArray) -> FloatArray:
-        """Map `noise` (size,) of the compared samples to noise of the engine torque samples
-        (m,)."""
-        if self.of_speeds is None:
-            return np.zeros(self.engine_torque.time.size)
-        return np.asarray(self._build_torque_map(self.of_speeds) @ noise)
-
     def _build_torque_map(self, of_speeds: TorqueOfSpeeds) -> csr_array:
         """Compute the noise of engine torque samples per that of a compared sample (m, size)."""
         torque = self.engine_torque.time

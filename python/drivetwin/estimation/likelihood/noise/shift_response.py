@@ -41,10 +41,6 @@ class ShiftResponse(LinearResponse):
 
     effect: FloatArray
 
-    def propagate_forces(self, force: FloatArray) -> FloatArray:
-        """Compute z (N, 4) for forces (N-1, 4) on the speeds, the last column 0."""
-        return self.propagate(np.einsum("kij,kj->ki", self.effect, force))
-
     def apply_torque_feedback(self, slope: FloatArray) -> ShiftResponse:
         """The response where the engine torque follows the engine speed by `slope` (N-1,)
         [N m s/rad], over each step by the mean of the speed at both its ends."""
