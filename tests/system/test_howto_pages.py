@@ -18,6 +18,7 @@ TUTORIALS = sorted((DOCS / "tutorial").glob("*.md"))
 SHIFT = ("synth -o shift.csv", "copy shift.card.toml truck.toml")
 OUT = (*SHIFT, "identify shift.csv --vehicle truck.toml -o out")
 RUNS = tuple(f"synth --seed {seed} -o run{seed}.csv" for seed in (1, 2, 3))
+DAYS = tuple(f"synth -o {day}.mf4" for day in ("monday", "tuesday", "wednesday"))
 SHORT = {
     "build-a-model.md": (),
     "check-a-card.md": (),
@@ -40,7 +41,7 @@ LONG = {
     "observe.md": (*OUT, "copy out/twin.toml twin.toml", "synth --seed 2 -o drive.csv"),
     "other-gearboxes.md": (),
     "paper-method.md": SHIFT,
-    "several-logs.md": RUNS,
+    "several-logs.md": (*RUNS, *DAYS, "copy monday.card.toml truck.toml"),
     "synthetic-log.md": (),
 }
 """Pages by name, with the commands that make the files which the page takes as given."""

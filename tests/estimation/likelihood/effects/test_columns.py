@@ -144,6 +144,7 @@ def test_a_column_is_the_motion_of_the_locked_driveline(quiet: Any) -> None:
     at = quiet
     (drag,) = EFFECTS[EffectId.BRAKE_DRAG].build(at, STD)
     shift = bench(noise=0.0).signals.shift
+    assert drag.force is not None
     state = at.response.propagate(np.einsum("kij,kj->ki", at.response.effect, drag.force))
     signals = split(at, observe(at, [drag])[:, 0])
     locked = int(np.searchsorted(at.run.time, shift.lockup_time + MARGIN))
