@@ -138,7 +138,7 @@ def fit(unknowns: Mapping[str, Unknown], expressions: Mapping[str, Expression]) 
 
 @pytest.mark.parametrize("product", ["scale * ratio", lambda scale, ratio: scale * ratio])
 def test_functions_set_numbers_and_are_reported(product: str | Callable[..., float]) -> None:
-    """The same fit with both stiffnesses as unknowns."""
+    """A fit with both stiffnesses as unknowns is the reference."""
     direct = fit(
         {"left.stiffness": Unknown(420.0, 100.0), "right.stiffness": Unknown(798.0)},
         {"excess": Expression("'right.stiffness' - left.stiffness", paths=[], unit="N*m/rad")},

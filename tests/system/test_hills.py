@@ -38,13 +38,13 @@ def hilly() -> ShiftLog:
 
 
 @shared
-def found() -> Identification:
+def identify_hills() -> Identification:
     log = hilly()
     return identify(log, card(), drivetwin.detect_shifts(log, card()))
 
 
 def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it() -> None:
-    one, model = found(), scenario().model
+    one, model = identify_hills(), scenario().model
     truth = {"Tv_over_if": float(np.mean(LOADS)), "J_vehicle": model.J_v, "eta": model.eta}
     for name, value in truth.items():
         told = one.estimates[name]
@@ -58,7 +58,7 @@ def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it() -> None
 
 
 def test_each_shift_is_simulated_on_its_own_grade() -> None:
-    one, log = found(), hilly()
+    one, log = identify_hills(), hilly()
     twin = build_twin(one, card())
     own = drivetwin.attach_validation(one, twin, log)
     flat = replace(one, evidence=replace(one.evidence, loads=()))

@@ -15,7 +15,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.segments import MOMENTUM, find_off_going_release
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
-from drivetwin.estimation.direct.friction_law import LAW_PRIOR, LOG_V
+from drivetwin.estimation.direct.friction_law import LAW_PRIOR, LOG_V, evaluate_stribeck
 from drivetwin.estimation.direct.window_means import (
     compute_window_edges,
     compute_window_means,
@@ -60,7 +60,8 @@ def estimate_friction_law(signals: ShiftSignals, driveline: KnownDriveline) -> F
     means, stds = np.array([LAW_PRIOR[k] for k in range(LOG_V + 1)]).T
     best, least = np.empty(0), np.inf
     for v_s in POINTS.slip_scales:
-        law = np.column_stack([np.ones_like(slip), np.exp(-slip / v_s), slip])
+        _, slopes = evaluate_stribeck(np.array([0.0, 0.0, 0.0, np.log(v_s)]), slip)
+        law = slopes[:LOG_V].T
         rows = np.vstack([capacity[:, None] * law / noise[:, None], np.diag(1.0 / stds[:LOG_V])])
         target = np.concatenate([torque / noise, means[:LOG_V] / stds[:LOG_V]])
         found = np.linalg.lstsq(rows, target, rcond=None)[0]

@@ -113,7 +113,7 @@ def select_ring_samples(
 def estimate_pencil_start(
     time: FloatArray, values: FloatArray, order: int = 6
 ) -> tuple[float, float]:
-    """Decay rate [1/s] and frequency [rad/s] of the strongest mode in `BAND`, by matrix pencil.
+    """Estimate decay rate [1/s] and frequency [rad/s] of the strongest mode by a matrix pencil.
 
     `values` (n,) over equidistant `time` (n,), trend removed; it is thinned to about 200 samples.
     """

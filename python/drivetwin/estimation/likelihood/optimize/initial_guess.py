@@ -33,10 +33,9 @@ from drivetwin.estimation.direct.friction_law import LOG_V, MU_C, MU_DROP, MU_V
 from drivetwin.estimation.direct.friction_points import estimate_friction_law
 from drivetwin.estimation.direct.load_balance import estimate_load
 from drivetwin.estimation.direct.momentum_balance import estimate_momentum_inertia
-from drivetwin.estimation.direct.ringdown import estimate_pencil_start
+from drivetwin.estimation.direct.ringdown import compute_shaft_parameters, estimate_pencil_start
 from drivetwin.estimation.direct.window_means import drop_nan_rows
 from drivetwin.estimation.likelihood.parametrization import LAW, build_load_deviations
-from drivetwin.simulation.dual_clutch import compute_series_inertia
 from drivetwin.vehicle.spec import compute_middle
 
 LOAD = "Tv_over_if"
@@ -92,9 +91,8 @@ def _estimate_shift(
     """Compute initial values from one shift; the friction is that of the on-coming element."""
     found = _estimate_rigid(signals, driveline, design)
     J4 = found["J_e"] * driveline.i_after**2 + found["J_out"]
-    J = compute_series_inertia(J4, found["J_vehicle"] / driveline.i_f**2)
-    rate, omega = _estimate_mode(signals, driveline)
-    found |= {"k_o": J * (rate**2 + omega**2), "c_o": 2.0 * rate * J}
+    shaft = *_estimate_mode(signals, driveline), J4, found["J_vehicle"] / driveline.i_f**2
+    found["k_o"], found["c_o"] = compute_shaft_parameters(*shaft).tolist()
     found |= {f"{one.name}.drum": one.drum.value for one in driveline.couplings.values()}
     found |= {f"{one.name}.P0": one.P0.value for one in (driveline.offgoing, driveline.oncoming)}
     law = _estimate_law(signals, driveline, found)
