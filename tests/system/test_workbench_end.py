@@ -27,16 +27,23 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignor
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from drivetwin.workbench import jobs, server
 from tests.system.test_workbench_end import sleep_long
-begin = server.start_server
+begin, end = server.start_server, jobs.end_all
+
+def wait_for_job():
+    # A request that waits for a job, as one that opens a log does.
+    threading.Thread(target=jobs.call, args=(sleep_long,), kwargs={"limit": 300.0}).start()
 
 def start(*given):
     made = begin(*given)
     jobs.start(sleep_long)
-    # A request that waits for a job, as one that opens a log does.
-    threading.Thread(target=jobs.call, args=(sleep_long,), kwargs={"limit": 300.0}).start()
+    wait_for_job()
     return made
 
-server.start_server = start
+def end_all():
+    end()
+    wait_for_job()  # a request that comes late
+
+server.start_server, jobs.end_all = start, end_all
 sys.argv = ["drivetwin", "app", "--port", "0", "--no-browser"]
 from drivetwin.__main__ import main
 sys.exit(main())
