@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from drivetwin.cli.identify_run import IdentifyOptions, Outcome, run_identification
+from drivetwin.cli.identify_run import IdentifiedLog, IdentifyOptions, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario
@@ -35,13 +35,13 @@ OPTIONS = (
 )
 
 
-def identify_demo(folder: Path) -> Outcome:
+def identify_demo(folder: Path) -> IdentifiedLog:
     """Write the log of the demo into `folder` and identify it."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=0))
     return run_identification(log, IdentifyOptions(vehicle=card, method=DEFAULT_METHOD))
 
 
-def write_report(outcome: Outcome, folder: Path) -> Path:
+def write_report(outcome: IdentifiedLog, folder: Path) -> Path:
     """Write the report."""
     path = folder / "report.html"
     save_report(path, outcome.found, outcome.log)

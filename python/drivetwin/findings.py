@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum, auto
 from functools import cache
@@ -217,6 +217,10 @@ class Entry:
     severity: Severity = Severity.WARNING
     columns: tuple[tuple[str, str], ...] = ()
     """Table of a finding with rows: head and template of each column."""
+    alike: str = ""
+    """Name, or `subject`, by which findings of this code differ that are shown as one."""
+    worst: str = ""
+    """Number that is least in the worst of these; without one the first is shown."""
 
 
 @cache
@@ -231,6 +235,8 @@ def load_catalogue() -> dict[Code, Entry]:
             table.get("remedy", ""),
             Severity(table.get("severity", "warning")),
             tuple((head, cell) for head, cell in table.get("columns", ())),
+            table.get("alike", ""),
+            table.get("worst", ""),
         )
         for code, table in tables.items()
     }
@@ -383,6 +389,29 @@ def sort_by_severity(findings: Iterable[Finding]) -> list[Finding]:
     return sorted(findings, key=lambda one: order.index(one.severity))
 
 
+_LISTED = 3
+"""Number of equal findings that are named beside the worst."""
+
+
 def render(findings: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the texts of findings, each once."""
-    return tuple(dict.fromkeys(one.text for one in findings))
+    """Return the texts of findings; equal ones are one text, the worst with their number."""
+    kinds: dict[tuple[str, str], dict[str, Finding]] = {}
+    for one in findings:
+        kind = (one.code, "" if load_catalogue()[one.code].alike else one.reason)
+        kinds.setdefault(kind, {})[one.text] = one
+    return tuple(_render_equal(list(each.values())) for each in kinds.values())
+
+
+def _render_equal(equal: Sequence[Finding]) -> str:
+    entry = load_catalogue()[equal[0].code]
+    worst = min(equal, key=lambda one: one.numbers[entry.worst].value) if entry.worst else equal[0]
+    if len(equal) == 1:
+        return worst.text
+    labels = [
+        one.names.get(entry.alike) or ": ".join(filter(None, (str(one.place), one.subject)))
+        for one in equal
+        if one is not worst
+    ]
+    names = [*dict.fromkeys(labels)]
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return f"{worst.text} ({len(equal)} of this kind; also {', '.join(names[:_LISTED])}{more})"

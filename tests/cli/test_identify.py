@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.cli import identify as identify_command
 from drivetwin.cli import main
 from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.report.outcome import Outcome
 from tests.cli.conftest import Files
 
 
@@ -152,8 +152,9 @@ def test_a_bad_card_is_told_once_for_all_logs(
 def test_strict_passes_a_confirmed_model_only(
     bench_files: Files, monkeypatch: pytest.MonkeyPatch, status: ModelStatus
 ) -> None:
-    monkeypatch.setattr(identify_command, "_identify_log", lambda *_: {"status": status.value})
-    monkeypatch.setattr(identify_command, "_identify_joint", lambda *_: status)
+    made = Outcome(document={}, is_confirmed=status.is_confirmed)
+    for name in ("identify_run.identify_log", "identify_joint.identify_jointly"):
+        monkeypatch.setattr(f"drivetwin.cli.{name}", lambda *_: made)
     arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
     expected = 0 if status in (ModelStatus.VALID, ModelStatus.LIMITED) else 3
     assert main([*arguments, "--strict"]) == expected

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.findings import Code, report
+from drivetwin.report.bus import explain_bus
 from tests.support.bus_logs import write_log, write_ratio_card
 
 
@@ -74,6 +76,18 @@ def test_shifts_of_a_bus_log_have_the_phases_of_the_identification(
     assert "elements" not in printed
 
 
+def test_strict_refuses_logs_of_which_too_little_follows(
+    logs: list[Path], card: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [str(one) for one in logs]
+    assert main(["identify", *names, "--vehicle", str(card), "--strict"]) == 0
+    assert capsys.readouterr().out.startswith("Bus logs: ")
+    contradiction = report(Code.BUS_SHIFTS_CONTRADICT, shift="2-3", quantity="f_d", p=1e-6)
+    verdict = explain_bus({}, [contradiction], ())
+    assert not verdict.is_confirmed
+    assert "2-3 contradicts the other shifts" in verdict.block.reason
+
+
 def test_an_output_torque_needs_a_vehicle_card(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -85,7 +99,6 @@ def test_an_output_torque_needs_a_vehicle_card(
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (["--strict"], "no model to validate"),
         (["--hold-out", "other"], "names no log"),
         (["--hold-out", "run0"], "all logs are held out"),
     ],

@@ -7,7 +7,7 @@ Command line, JSON Schema, checks, recorded settings and controls of a page deri
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, FrozenInstanceError, dataclass, field, fields
 from enum import Enum, StrEnum
 from pathlib import Path
@@ -73,6 +73,10 @@ class Argument:
     output: Output | None = None
     decides: bool = True
     shows_default: bool = True
+    excludes: tuple[str, ...] = ()
+    """Arguments beside which this one has no effect, or the other has none."""
+    needs: tuple[str, ...] = ()
+    """Arguments without which this one has no effect."""
 
     @property
     def placeholder(self) -> str | None:
@@ -130,10 +134,14 @@ def argument(help: str, metavar: str, *, default: Any = REQUIRED, **described: A
 
 
 def input_file(
-    help: str, metavar: str = "FILE", role: FileRole = FileRole.OTHER, default: Any = None
+    help: str,
+    metavar: str = "FILE",
+    role: FileRole = FileRole.OTHER,
+    default: Any = None,
+    **described: Any,
 ) -> Any:
     """Declare an option that names a file to read."""
-    return option(help, metavar=metavar, role=role, default=default)
+    return option(help, metavar=metavar, role=role, default=default, **described)
 
 
 def output_folder(help: str, metavar: str = "DIR", default: Any = None) -> Any:
@@ -174,6 +182,7 @@ class Request:
         dataclass(init=False, repr=False, eq=False, match_args=False, kw_only=True)(cls)
 
     def __init__(self, **given: Any) -> None:
+        stated = frozenset(name for name, one in given.items() if one not in (None, False, ()))
         for one in fields(self):
             if one.name not in given and one.default_factory is not MISSING:
                 given[one.name] = one.default_factory()
@@ -182,14 +191,39 @@ class Request:
         if unknown := given.keys() - self.__dataclass_fields__.keys():
             raise TypeError(f"{type(self).__name__} has no {', '.join(sorted(unknown))}")
         vars(self).update(given)
+        vars(self)["_stated"] = stated
         for name, declared in get_arguments(type(self)).items():
             declared.check(name, getattr(self, name))
+            self._check_company(name, declared)
+
+    @property
+    def stated(self) -> frozenset[str]:
+        """Names of the arguments that were given a value."""
+        names: frozenset[str] = vars(self)["_stated"]
+        return names
+
+    def _check_company(self, name: str, declared: Argument) -> None:
+        """Raise InputError for arguments of which one has no effect beside or without another."""
+        if name not in self.stated:
+            return
+        for other in declared.excludes:
+            self.refuse_stated([other], f"{spell_option(name)} takes its place")
+        missing = [one for one in declared.needs if one not in self.stated]
+        if missing:
+            what = f"{spell_option(name)} has no effect without {spell_option(missing[0])}"
+            raise InputError(what, "give both, or none", Where(key=spell_option(name)))
+
+    def refuse_stated(self, names: Iterable[str], reason: str) -> None:
+        """Raise InputError if one of the arguments was given; `reason` is why it has no effect."""
+        for name in sorted(self.stated.intersection(names)):
+            what = f"{spell_option(name)} has no effect here: {reason}"
+            raise InputError(what, "leave it out", Where(key=spell_option(name)))
 
     def __setattr__(self, name: str, value: object) -> None:
         raise FrozenInstanceError(f"cannot assign to field {name!r}")
 
     def __repr__(self) -> str:
-        listed = ", ".join(f"{name}={value!r}" for name, value in vars(self).items())
+        listed = ", ".join(f"{one.name}={getattr(self, one.name)!r}" for one in fields(self))
         return f"{type(self).__name__}({listed})"
 
     def select(self, base: type[Request]) -> dict[str, Any]:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
 """Files that `identify -o` writes."""
+BUS_RESULT = "bus.json"
+"""Result that `identify -o` writes for bus logs."""
+FIT_RESULT, MODEL = "fit.json", "model.toml"
+"""Files that `fit -o` writes beside the report."""
 GEARBOX_HELP = "Gearbox card (TOML), or name of a built-in gearbox."
 
 
@@ -37,13 +41,13 @@ def card_option(default: Any = None) -> Any:
     return input_file(help, "CARD", FileRole.CARD, default)
 
 
-def mapping_option() -> Any:
+def mapping_option(**described: Any) -> Any:
     """Declare the channel mapping of a log."""
     help = (
         "Channel mapping file (TOML); without it channels.toml beside the log and the mapping of "
         "the twin, if any."
     )
-    return input_file(help, "MAP", FileRole.MAPPING)
+    return input_file(help, "MAP", FileRole.MAPPING, **described)
 
 
 def method_option() -> Any:
@@ -54,6 +58,17 @@ def method_option() -> Any:
 def quick_option() -> Any:
     """Declare the identification by one model."""
     return flag("Fit one model, and try no other sampling modes, minima and elements.")
+
+
+def strict_flag(condition: str) -> Any:
+    """Declare `--strict`."""
+    return flag(f"Exit with code 3 unless {condition}.", decides=False)
+
+
+def result_argument() -> Any:
+    """Declare the result of identify, examine or fit."""
+    help = "Result: folder of identify, examine or fit, its result file, or twin.toml."
+    return argument(help, "RESULT", role=FileRole.RESULT)
 
 
 class TwinInput(Request):

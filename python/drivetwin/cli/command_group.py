@@ -54,7 +54,7 @@ class CommandGroup(TyperGroup):
             raise
 
 
-Entry = Callable[..., None] | CommandGroup
+Entry = Callable[..., Any] | CommandGroup
 """A command as its function, or a group of commands."""
 
 

@@ -10,15 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import Request, input_file, option, output_folder
-from drivetwin.cli.arguments import card_option, log_argument, mapping_option
-from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
+from drivetwin.cli.arguments import card_option, log_argument, mapping_option, strict_flag
+from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.report.blocks import Block, TableBlock, make_table
+from drivetwin.report.blocks import Block, Cell, TableBlock, make_table
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
-    from drivetwin.cli.identify_run import Outcome
+    from drivetwin.cli.identify_run import IdentifiedLog
     from drivetwin.estimation.analysis.profile_likelihood import Profile
     from drivetwin.fit.examine import Improvement
     from drivetwin.twin.twin import Twin
@@ -31,7 +32,11 @@ class Examine(Request, command="examine"):
 
     log: Path = log_argument()
     vehicle: Path | None = card_option()
-    model: Path | None = input_file("Model file of 'drivetwin fit', in place of a card.", "MODEL")
+    model: Path | None = input_file(
+        "Model file of 'drivetwin fit', in place of a card.",
+        "MODEL",
+        excludes=("vehicle", "channels", "friction"),
+    )
     channels: Path | None = mapping_option()
     profile: tuple[str, ...] = option(
         "Compute the profile likelihood of a parameter, such as J_out.",
@@ -42,37 +47,31 @@ class Examine(Request, command="examine"):
     friction: FrictionShape | None = option(
         "Estimate friction over slip as a curve of this shape instead of the Stribeck law."
     )
+    strict: bool = strict_flag("the model is valid, limits included")
     output: Path | None = output_folder("Folder for the files.")
 
 
-def examine(request: Examine, *, as_json: bool) -> None:
+def examine(request: Examine) -> Outcome:
     """Recommend the test that reduces parameter uncertainty most, and test the intervals.
 
     The log is first identified by the likelihood method. The command lists the experiments that
     narrow weak, not identifiable and least known parameters, with the expected intervals. Options
     add the profile likelihood, and friction curves of free or monotone shape with a twin. With a
-    model file the log is fitted as by 'drivetwin fit', and all but the friction curves apply.
+    model file the log is fitted as by 'drivetwin fit', and all but the friction curves apply. The
+    folder of -o also has the files that identify or fit writes.
     """
-    from drivetwin.cli.identify_run import IdentifyOptions, run_identification
-
-    if request.model is not None and request.vehicle is None:
-        answers = list(_iterate_fit_answers(request.model, request))
-    elif request.vehicle is None or request.model is not None:
+    for name in request.profile if request.model is None else ():
+        get_parameter_spec(name)
+    if (request.model is None) == (request.vehicle is None):
         raise InputError("name what the log is of", "give --vehicle CARD or --model MODEL")
-    else:
-        for name in request.profile:
-            get_parameter_spec(name)
-        how = IdentifyOptions(vehicle=request.vehicle, channels=request.channels)
-        outcome = run_identification(request.log, how)
-        answers = list(_iterate_answers(outcome, request))
-    files = () if request.output is None else _write_outputs(request.output, answers)
-    if as_json:
-        print_json({one.file: json.loads(one.text) for one in answers})
-        return
-    for one in answers:
-        print_blocks(one.blocks)
-    for file in files:
-        print_line(f"wrote {file}")
+    examined = _examine_fit if request.model is not None else _examine_log
+    answers, outcome = examined(request)
+    files = outcome.files
+    if request.output is not None:
+        files = (*files, *_write_outputs(request.output, answers))
+    document = {one.file: json.loads(one.text) for one in answers}
+    blocks = [*outcome.blocks[:1], *(block for one in answers for block in one.blocks)]
+    return Outcome(blocks, document, files, outcome.is_confirmed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,27 +84,42 @@ class Answer:
     twin: Twin | None = None
 
 
-def _iterate_answers(outcome: Outcome, request: Examine) -> Iterator[Answer]:
-    """Every answer, in the order in which they are printed."""
+def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
+    """Identify a log; return every answer in the order of printing, and the identification."""
+    from drivetwin.cli.identify_run import (
+        IdentifyOptions,
+        build_outcome,
+        run_identification,
+        write_outcome,
+    )
     from drivetwin.estimation.analysis.experiment_design import compute_rankings
     from drivetwin.estimation.analysis.profile_likelihood import compute_profile
     from drivetwin.files import analysis_files
     from drivetwin.report.sections.identifiability import build_suggestion_blocks
 
-    found = outcome.found
+    assert request.vehicle is not None
+    how = IdentifyOptions(vehicle=request.vehicle, channels=request.channels)
+    made = run_identification(request.log, how)
+    found = made.found
     with show_step("comparing experiments"):
         suggestions = found.evidence.suggestions or compute_rankings(found)
-    yield Answer(
-        SUGGESTIONS,
-        analysis_files.format_suggestions(suggestions),
-        build_suggestion_blocks(suggestions, found.estimates),
-    )
-    yield from _iterate_profiles(found, request, compute_profile)
+    answers = [
+        Answer(
+            SUGGESTIONS,
+            analysis_files.format_suggestions(suggestions),
+            build_suggestion_blocks(suggestions, found.estimates),
+        ),
+        *_iterate_profiles(found, request, compute_profile),
+    ]
     if request.friction is not None:
-        yield _identify_friction(outcome, request.friction)
+        friction = _identify_friction(made, request.friction)
+        answers.append(friction)
+        made = replace(made, twin=friction.twin or made.twin)
+    files = () if request.output is None else write_outcome(made, request.output)
+    return answers, build_outcome(found, files)
 
 
-def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
+def _identify_friction(outcome: IdentifiedLog, shape: FrictionShape) -> Answer:
     """Friction of a shape, with the twin that has it."""
     from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
     from drivetwin.estimation.data.prepare import collect_tolerances
@@ -124,20 +138,10 @@ def _identify_friction(outcome: Outcome, shape: FrictionShape) -> Answer:
 
 
 def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
-    """Write all files or none."""
-    from drivetwin.cli.arguments import TWIN
-    from drivetwin.cli.atomic_outputs import write_atomically
-    from drivetwin.files.twin_file import save_twin
+    """Write the answers, all or none."""
+    from drivetwin.cli.atomic_outputs import write_texts
 
-    names: list[str] = []
-    with write_atomically(folder) as beside:
-        for one in answers:
-            (beside / one.file).write_text(one.text, encoding="utf-8", newline="\n")
-            names.append(one.file)
-            if one.twin is not None:
-                save_twin(beside / TWIN, one.twin)
-                names.append(TWIN)
-    return tuple(folder / name for name in names)
+    return write_texts(folder, {one.file: one.text for one in answers})
 
 
 def _build_profile_table(one: Profile, unit: str) -> TableBlock:
@@ -154,27 +158,26 @@ def _build_profile_table(one: Profile, unit: str) -> TableBlock:
     return make_table(f"Profile likelihood of {one.parameter}", columns, rows)
 
 
-def _iterate_fit_answers(model: Path, request: Examine) -> Iterator[Answer]:
-    """Fit a model to a log, and yield every answer in the order in which they are printed."""
+def _examine_fit(request: Examine) -> tuple[list[Answer], Outcome]:
+    """Fit a model to a log; return every answer in the order of printing, and the fit."""
+    from drivetwin.cli.fit import Fit, fit_logs
     from drivetwin.files import analysis_files
     from drivetwin.fit.examine import compute_profile, rank_improvements
-    from drivetwin.fit.fit import fit_network
-    from drivetwin.fit.model_file import read_model
-    from drivetwin.fit.read import read_recording
 
-    network, channels = read_model(model)
-    with show_step(f"fitting {network.name}"):
-        found = fit_network(
-            network, [read_recording(request.log, network, channels)[0]], seed=request.seed
-        )
+    assert request.model is not None
+    how = Fit(model=request.model, logs=(request.log,), seed=request.seed, output=request.output)
+    found, outcome = fit_logs(how)
     units = {name: one.unit for name, one in found.estimates.items()}
     improvements = rank_improvements(found)
-    yield Answer(
-        SUGGESTIONS,
-        analysis_files.format_improvements(improvements, units),
-        [_build_improvement_table(improvements, units)],
-    )
-    yield from _iterate_profiles(found, request, compute_profile)
+    answers = [
+        Answer(
+            SUGGESTIONS,
+            analysis_files.format_improvements(improvements, units),
+            [_build_improvement_table(improvements, units)],
+        ),
+        *_iterate_profiles(found, request, compute_profile),
+    ]
+    return answers, outcome
 
 
 def _iterate_profiles(
@@ -201,9 +204,14 @@ def _build_improvement_table(found: Sequence[Improvement], units: Mapping[str, s
             format_half_width(width, units[one.unknown])
             for width in (one.now, one.repeated, one.then)
         )
-        rows.append((one.unknown, now, several, *((one.known, then) if one.known else ("–", ""))))
+        rows.append((one.unknown, now, several, Cell(one.known, note=then) if one.known else None))
     return make_table(
         "Narrower intervals, ± 95 %",
-        ("unknown", ("now", "s"), (f"{REPEATS} recordings", "s"), "or exact", ("then", "s")),
+        (
+            "unknown",
+            ("now", "s"),
+            (f"{REPEATS} recordings", "s"),
+            Cell("or exact", note="± 95 % then"),
+        ),
         rows,
     )

@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING
 
 from drivetwin._util.outputs import Output, Shape
 from drivetwin._util.request import flag, input_file, option, output_file
-from drivetwin.cli.arguments import TwinInput, mapping_option, read_twin_log
-from drivetwin.cli.output import print_json, print_line, print_paragraph, show_step
-from drivetwin.errors import InputError, Where
+from drivetwin.cli.arguments import mapping_option, read_twin_log, result_argument
+from drivetwin.cli.output import show_step
+from drivetwin.errors import InputError
 from drivetwin.export.targets import Target
-from drivetwin.export.write import ExportedModel, ExportOptions, write_export
+from drivetwin.export.write import ExportedModel, ExportOptions, write_content, write_export
+from drivetwin.report.blocks import TextBlock
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
+    from drivetwin.report.results import MadeResult
     from drivetwin.twin.twin import Twin
 
 
-class Export(ExportOptions, TwinInput, command="export"):
+class Export(ExportOptions, command="export"):
     """Arguments of `export`."""
 
+    twin: Path = result_argument()
     output: Path | None = output_file(
         "File, or folder for c; default: ./TWIN.FORMAT.", "PATH", shape=Shape.EITHER
     )
@@ -35,72 +39,90 @@ class Export(ExportOptions, TwinInput, command="export"):
         "(CSV), delays removed.",
         metavar="FILE",
         output=Output(),
+        needs=("log",),
     )
     as_logged: bool = flag(
         "For models, with --log: take inputs as the log shows them. The model delays the earlier "
-        "inputs, and its outputs are later by the largest delay."
+        "inputs, and its outputs are later by the largest delay.",
+        needs=("log",),
     )
-    channels: Path | None = mapping_option()
+    channels: Path | None = mapping_option(needs=("log",))
 
 
-def export(request: Export, *, as_json: bool) -> None:
+def export(request: Export) -> Outcome:
     """Write the identified model for another program.
 
     c: C99 sources for a controller. fmu: co-simulation FMU with sources. modelica: package of
     components of the Standard Library. ssv, cdfx, dcm, m, csv: parameter files with units and
-    intervals.
+    intervals, of the results of bus logs and of fits too.
     """
-    from drivetwin.files.twin_file import load_twin
+    from drivetwin.report.results import open_result
 
-    twin, to = load_twin(request.twin), request.to
+    made, to = open_result(request.twin), request.to
+    request.refuse_stated(_list_unused(to), f"--to {to.value} does not use it")
     path = request.output or Path(f"{request.twin.stem}.{to.ending}")
-    listed: dict[str, object] = {"fmi": request.fmi.value} if to is Target.FMU else {}
     with show_step(f"writing {path.name}"):
-        made = write_export(twin, request, path, lambda: _load_model(twin, request))
-        if isinstance(made, ExportedModel):
-            _write_inputs(made, request.inputs, as_json)
-            if to is not Target.MODELICA:
-                listed |= _report_reduction(made, as_json)
-        else:
-            listed["parameters"] = [one.name for one in made.entries]
-            for line in () if as_json else made.notes:
-                print_paragraph(line)
-    if as_json:
-        print_json({"file": str(path), **listed})
-    else:
-        print_line(f"wrote {path}")
+        if not to.is_model and not made.can_have_twin:
+            return _export_estimates(made, request, path)
+        twin = made.load_twin()
+        written = write_export(twin, request, path, lambda: _load_model(twin, request))
+        if isinstance(written, ExportedModel):
+            return _describe_model(written, request, path)
+        names = [one.name for one in written.entries]
+        notes = [TextBlock(line) for line in written.notes]
+        return Outcome(notes, {"file": str(path), "parameters": names}, [path])
 
 
-def _report_reduction(made: ExportedModel, as_json: bool) -> dict[str, object]:
-    """Report the elements that C and FMU leave out, and their error in the shift of the log."""
+def _list_unused(to: Target) -> set[str]:
+    """Return the options that an export to a target does not use."""
+    of_models = {"shift", "log", "inputs", "as_logged", "channels"}
+    of_fmu = {"fmi", "platforms"}
+    if not to.is_model:
+        return of_models | of_fmu
+    of_parameters = {"names", "powertrain", "template"}
+    return of_parameters if to is Target.FMU else of_parameters | of_fmu
+
+
+def _export_estimates(made: MadeResult, request: Export, path: Path) -> Outcome:
+    """Write the estimates of a result that has no twin."""
+    from drivetwin.export.parameters.of_twin import collect_estimates
+
+    request.refuse_stated({"names", "powertrain"}, "the result has no clutches of a shift")
+    estimates = made.estimates
+    content = collect_estimates(made.file.parent.name, estimates, [made.describe_origin()])
+    unvalued = [name for name, one in estimates.items() if one.value is None]
+    written = write_content(content, unvalued, request, path)
+    names = [one.name for one in written.entries]
+    return Outcome((), {"file": str(path), "parameters": names}, [path])
+
+
+def _describe_model(made: ExportedModel, request: Export, path: Path) -> Outcome:
+    """Describe an exported model; write the inputs of the shift if they are asked for.
+
+    C and FMU leave out elements; their error in the shift of the log is stated.
+    """
+    from drivetwin._util.atomic import write_text
+    from drivetwin.export.fmu.experiment import format_inputs
+
+    files, document = [path], {"file": str(path)}
     subject, experiment = made.subject, made.experiment
-    if not subject.added_element_names:
-        return {}
+    if request.inputs is not None:
+        assert experiment is not None
+        write_text(request.inputs, format_inputs(subject, experiment))
+        files.append(request.inputs)
+    if request.to is Target.FMU:
+        document["fmi"] = request.fmi.value
+    if request.to is Target.MODELICA or not subject.added_element_names:
+        return Outcome((), document, files)
     text = f"left out: {subject.added_element_names}"
-    listed: dict[str, object] = {"left_out": subject.added_element_names}
+    listed: dict[str, object] = {**document, "left_out": subject.added_element_names}
     if experiment is None:
         text += "; give a shift with --log to see the error"
     else:
         error = subject.compute_reduction_error(experiment.time, experiment.inputs)
         listed["largest_error"] = error
         text += f"; the output torque differs by up to {100.0 * error:.2g} % of its largest value"
-    if not as_json:
-        print_paragraph(text)
-    return listed
-
-
-def _write_inputs(made: ExportedModel, path: Path | None, as_json: bool) -> None:
-    """Write the inputs of the log's shift, if they are asked for. Raises InputError without one."""
-    if path is None:
-        return
-    if made.experiment is None:
-        raise InputError("--inputs needs a log", "name it with --log", Where(key="--inputs"))
-    from drivetwin._util.atomic import write_text
-    from drivetwin.export.fmu.experiment import format_inputs
-
-    write_text(path, format_inputs(made.subject, made.experiment))
-    if not as_json:
-        print_line(f"wrote {path}")
+    return Outcome([TextBlock(text)], listed, files)
 
 
 def _load_model(twin: Twin, request: Export) -> ExportedModel:
@@ -109,9 +131,6 @@ def _load_model(twin: Twin, request: Export) -> ExportedModel:
 
     gears = None if request.shift is None else parse_gears(request.shift)
     if request.log is None:
-        if request.as_logged:
-            why = "--as-logged needs a log that shows how often the engine torque is updated"
-            raise InputError(why, "name it with --log", Where(key="--as-logged"))
         return ExportedModel(build_subject(twin, gears), None)
     from drivetwin.export.fmu.measured import build_measured_subject
 

@@ -35,6 +35,8 @@ _REMEDIES: dict[FileRole, dict[FileRole, str]] = {
         FileRole.MAPPING: "give the mapping with --channels, and the card with --vehicle",
     },
 }
+_FAMILIES = {"twin": FileRole.TWIN, **dict.fromkeys(("result", "bus", "fit"), FileRole.RESULT)}
+"""Roles of the files that commands wrote, by the family of their schema."""
 _ERRORS: dict[FileRole, type[InputError]] = {
     FileRole.TWIN: ResultFileError,
     FileRole.LOG: FileFormatError,
@@ -49,6 +51,8 @@ def resolve_file(path: Path, role: FileRole) -> Path:
     """
     if role is FileRole.TWIN:
         return find_twin(path)
+    if role is FileRole.RESULT and path.is_file():
+        return path if recognise_file(path) is FileRole.RESULT else find_twin(path)
     if role in _REMEDIES:
         require_kind(path, role)
     return path
@@ -67,12 +71,9 @@ def find_twin(source: Path) -> Path:
         require_kind(source, FileRole.TWIN)
         return source
     if not path.is_file():
-        raise ResultFileError(
-            f"there is no {TWIN} in {path.parent}",
-            "give the folder that 'drivetwin identify LOG --vehicle CARD -o DIR' wrote, or its "
-            f"{TWIN}",
-            Where(file=str(source)),
-        )
+        from drivetwin.report.results import open_result
+
+        open_result(source).load_twin()  # raises with the reason
     return path
 
 
@@ -118,9 +119,9 @@ def _recognise_document(path: Path, parse: Any) -> FileRole:
     if not isinstance(tree, dict):
         return FileRole.OTHER
     schema = str(tree.get("schema", ""))
-    for name, kind in (("twin", FileRole.TWIN), ("result", FileRole.RESULT)):
-        if schema.startswith(f"drivetwin/{name}-"):
-            return kind
+    family = schema.removeprefix("drivetwin/").rpartition("-")[0]
+    if family in _FAMILIES:
+        return _FAMILIES[family]
     if {"gears", "elements"} <= tree.keys() and not schema:
         return FileRole.CARD
     is_mapping = "channels" in tree and tree.keys() <= {"channels", "time", "bus"}

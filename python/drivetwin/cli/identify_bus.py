@@ -3,30 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin.cli.arguments import REPORT, find_mapping
-from drivetwin.cli.atomic_outputs import refuse_same_names
+from drivetwin.cli.arguments import BUS_RESULT, REPORT, find_mapping
+from drivetwin.cli.atomic_outputs import refuse_same_names, write_texts
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
-    from drivetwin.report.bus_outcome import BusOutcome
-
-BUS_RESULT = "bus.json"
-"""Result that `identify -o` writes for bus logs."""
+    from drivetwin.cli.identify import Identify
 
 
-def identify_bus_logs(
-    logs: Sequence[Path],
-    vehicle: Path | None,
-    channels: Path | None,
-    hold_out: Sequence[str],
-    strict: bool,
-) -> BusOutcome:
+def identify_bus_logs(request: Identify) -> Outcome:
     """Read all logs, identify those that are not held out, predict the decays of the rest.
 
     Raises the typed errors of the readers, and InputError for what needs a whole vehicle card.
@@ -34,19 +26,20 @@ def identify_bus_logs(
     from drivetwin.report.bus_outcome import identify_vehicle
     from drivetwin.vehicle.ratio_card import load_ratio_card
 
-    if strict:
-        raise InputError(
-            "bus logs give quantities with verdicts, but no model to validate",
-            "leave out --strict",
-            Where(key="--strict"),
-        )
+    logs, vehicle = request.logs, request.vehicle
     refuse_same_names(logs, "rename one of them")
-    held = _find_held(hold_out, logs)
+    held = _find_held(request.hold_out, logs)
     card = None if vehicle is None else load_ratio_card(vehicle)
     with show_step(f"reading {len(logs)} logs"):
-        read = [_read(path, channels, vehicle) for path in logs]
+        read = [_read(path, request.channels, vehicle) for path in logs]
     with show_step("identifying"):
-        return identify_vehicle(read, card, [logs.index(path) for path in held])
+        made = identify_vehicle(read, card, [logs.index(path) for path in held])
+    file = made.build_file(request.describe_settings())
+    files: Sequence[Path] = ()
+    if request.output is not None:
+        texts = {BUS_RESULT: file.to_json(), REPORT: made.render()}
+        files = write_texts(request.output, texts)
+    return Outcome(made.build_blocks(), file.to_document(), files, made.verdict.is_confirmed)
 
 
 def _read(path: Path, channels: Path | None, vehicle: Path | None) -> ShiftLog:
@@ -81,11 +74,3 @@ def _find_held(wanted: Sequence[str], logs: Sequence[Path]) -> list[Path]:
             "all logs are held out", "leave at least one to identify", Where(key="--hold-out")
         )
     return list(dict.fromkeys(held))
-
-
-def write_bus(outcome: BusOutcome, folder: Path, settings: Mapping[str, str]) -> tuple[Path, ...]:
-    """Write result and report into `folder`, all or none; returns their paths."""
-    from drivetwin.cli.atomic_outputs import write_texts
-
-    texts = {BUS_RESULT: outcome.build_file(settings).to_json(), REPORT: outcome.render()}
-    return write_texts(folder, texts)

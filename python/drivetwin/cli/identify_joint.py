@@ -5,44 +5,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.progress import scale_progress
 from drivetwin.cli.arguments import REPORT, RESULT, TWIN
 from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically
-from drivetwin.cli.identify_run import IdentifyOptions, read_shifts
+from drivetwin.cli.identify_run import IdentifyOptions, build_outcome, read_shifts
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.errors import InputError, Where
 from drivetwin.estimation.likelihood.mechanism import quick
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
-    from drivetwin.channels.shiftlog import ShiftLog
-    from drivetwin.estimation.identification import Identification
     from drivetwin.shifts.detect import FoundShifts
     from drivetwin.validation.multi_log import JointIdentification
 
 
-@dataclass(frozen=True, eq=False)
-class Joined:
-    """Result of a joint identification: fitted and held-out logs, and the identification."""
-
-    logs: tuple[ShiftLog, ...]
-    made: JointIdentification
-
-    @property
-    def found(self) -> Identification:
-        """The identification."""
-        return self.made.found
-
-
-def identify_logs(
-    logs: Sequence[Path],
-    how: IdentifyOptions,
-    wanted: Sequence[str],
-) -> Joined:
-    """Read all logs, fit what is not held out together, predict the rest.
+def identify_jointly(
+    logs: Sequence[Path], how: IdentifyOptions, wanted: Sequence[str], folder: Path | None
+) -> Outcome:
+    """Read all logs, fit what is not held out together, predict the rest, and write the result.
 
     Raises the typed errors of each stage.
     """
@@ -69,10 +53,11 @@ def identify_logs(
         made = identify_together(sources, card, how.method)
     with show_step("comparing experiments"):
         found = rank_for_weak(made.found)
-    return Joined(tuple(read), replace(made, found=found))
+    made = replace(made, found=found)
+    return build_outcome(found, () if folder is None else _write_joint(made, folder))
 
 
-def write_joint(outcome: Joined, folder: Path) -> tuple[Path, ...]:
+def _write_joint(made: JointIdentification, folder: Path) -> tuple[Path, ...]:
     """Write result, report and twins into `folder`, all or none; returns their paths.
 
     `twin.toml` is that of the first log; of several each has `NAME-OF-LOG.twin.toml` besides.
@@ -81,15 +66,15 @@ def write_joint(outcome: Joined, folder: Path) -> tuple[Path, ...]:
     from drivetwin.files.twin_file import save_twin
     from drivetwin.report.html import save_joint_report
 
-    twins = list(outcome.made.twins.items())
+    twins = list(made.twins.items())
     named = {TWIN: twins[0][1]}
     if len(twins) > 1:
         named |= {f"{Path(source).stem}.{TWIN}": twin for source, twin in twins}
     with show_step("writing the report"), write_atomically(folder) as beside:
-        save_result(beside / RESULT, outcome.found)
+        save_result(beside / RESULT, made.found)
         for name, twin in named.items():
             save_twin(beside / name, twin)
-        save_joint_report(beside / REPORT, outcome.found, outcome.made.fitted)
+        save_joint_report(beside / REPORT, made.found, made.fitted)
     return tuple(folder / name for name in (RESULT, *named, REPORT))
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
+from drivetwin.report.outcome import Outcome
 from drivetwin.vehicle.effects import parse_priors
 
 if TYPE_CHECKING:
@@ -61,7 +63,7 @@ class IdentifyOptions(CardInput):
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class IdentifiedLog:
     """Result of one log: the log, its card, the identification and the twin."""
 
     log: ShiftLog
@@ -89,7 +91,7 @@ def read_shifts(
         return log, shifts, tuple(check_card(card, log, shifts.shifts))
 
 
-def run_identification(log: Path, how: IdentifyOptions) -> Outcome:
+def run_identification(log: Path, how: IdentifyOptions) -> IdentifiedLog:
     """Read, find shifts, identify, and validate by simulation.
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
@@ -111,10 +113,25 @@ def run_identification(log: Path, how: IdentifyOptions) -> Outcome:
 
         with show_step("comparing experiments"):
             found = rank_for_weak(found)
-    return Outcome(recording, card, found, model.twin)
+    return IdentifiedLog(recording, card, found, model.twin)
 
 
-def write_outcome(outcome: Outcome, folder: Path) -> tuple[Path, ...]:
+def identify_log(log: Path, how: IdentifyOptions, folder: Path | None) -> Outcome:
+    """Identify a log, and write the result if a folder is given."""
+    made = run_identification(log, how)
+    return build_outcome(made.found, () if folder is None else write_outcome(made, folder))
+
+
+def build_outcome(found: Identification, files: Sequence[Path]) -> Outcome:
+    """Build the outcome of an identification with the files that were written."""
+    from drivetwin.files.result_file import ResultFile
+    from drivetwin.report.brief import build_identification_blocks
+
+    document = ResultFile.from_result(found).to_document()
+    return Outcome(build_identification_blocks(found), document, files, found.status.is_confirmed)
+
+
+def write_outcome(outcome: IdentifiedLog, folder: Path) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; returns their paths."""
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_file import save_twin

@@ -21,7 +21,7 @@ from drivetwin.cli.output import (
     show_step,
     to_error_document,
 )
-from drivetwin.errors import DrivetwinError, InputError, UnitError
+from drivetwin.errors import DrivetwinError, UnitError
 from drivetwin.findings import Finding
 from drivetwin.report.sections.inputs import build_column_table
 
@@ -44,7 +44,9 @@ class Inspect(Request, command="inspect"):
         metavar="MAP",
         output=Output(),
     )
-    accept_proposals: bool = flag("With --write-mapping: enter units that are the only proposal.")
+    accept_proposals: bool = flag(
+        "With --write-mapping: enter units that are the only proposal.", needs=("write_mapping",)
+    )
 
 
 def inspect(request: Inspect, *, as_json: bool) -> None:
@@ -62,8 +64,6 @@ def inspect(request: Inspect, *, as_json: bool) -> None:
     from drivetwin.vehicle.ratio_card import is_ratio_card
 
     log, write_mapping, accept = request.log, request.write_mapping, request.accept_proposals
-    if accept and write_mapping is None:
-        raise InputError("--accept-proposals needs a mapping file", "add --write-mapping MAP")
     vehicle = request.vehicle
     # A card of the ratios alone names no pressures.
     card = None if vehicle is None or is_ratio_card(vehicle) else load_card(vehicle)

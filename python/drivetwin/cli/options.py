@@ -16,9 +16,13 @@ import typer
 from drivetwin._util.atomic import protect_files, remove_unfinished
 from drivetwin._util.outputs import Output, lock_outputs
 from drivetwin._util.request import Argument, FileRole, Request, get_arguments, spell_option
+from drivetwin.cli.output import deliver
+from drivetwin.report.outcome import Outcome
 
-Command = Callable[..., None]
-"""Function of a request and, if its result has a form for programs, of the flag `as_json`."""
+Command = Callable[..., Any]
+"""Function of a request that returns an `Outcome` or yields several. One that prints by itself
+takes the flag `as_json` beside."""
+_AS_JSON = "as_json"
 _JSON_HELP = "Print only the result, as JSON on stdout."
 
 
@@ -45,8 +49,14 @@ def bind_command(command: Command) -> Command:
     outputs, request = find_outputs(command), get_request(command)
     arguments = get_arguments(request)
     flags = [name for name in signature(command).parameters if name != "request"]
+    is_runner = get_type_hints(command)["return"] is not type(None)
 
-    def bound(**given: Any) -> None:
+    def bound(context: typer.Context, **given: Any) -> None:
+        stated = {
+            name
+            for name in given
+            if (source := context.get_parameter_source(name)) and source.name == "COMMANDLINE"
+        }
         read = (value for name, value in given.items() if name not in outputs)
         with protect_files(path for value in read for path in _collect_paths(value)):
             written = [
@@ -58,15 +68,24 @@ def bind_command(command: Command) -> Command:
                 marker.check(path)
             with lock_outputs(path for path, _ in written):
                 remove_unfinished(path for path, _ in written)
+                as_json = is_runner and given.pop(_AS_JSON)
                 beside = {name: given.pop(name) for name in flags}
-                values = {name: arguments[name].to_si(value) for name, value in given.items()}
-                command(_make_request(request, values), **beside)
+                values = {
+                    name: arguments[name].to_si(value)
+                    for name, value in given.items()
+                    if name in stated
+                }
+                made = command(_make_request(request, values), **beside)
+                if is_runner:
+                    outcomes = [made] if isinstance(made, Outcome) else made
+                    deliver(outcomes, as_json=as_json, strict=given.get("strict", False))
 
-    parameters = [*_iterate_parameters(request)]
-    if "as_json" in flags:
+    context = Parameter("context", Parameter.KEYWORD_ONLY, annotation=typer.Context)
+    parameters = [context, *_iterate_parameters(request)]
+    if is_runner or _AS_JSON in flags:
         hint = Annotated[bool, typer.Option("--json", help=_JSON_HELP)]
         parameters.append(
-            Parameter("as_json", Parameter.KEYWORD_ONLY, default=False, annotation=hint)
+            Parameter(_AS_JSON, Parameter.KEYWORD_ONLY, default=False, annotation=hint)
         )
     update_wrapper(bound, command)
     vars(bound)["__signature__"] = Signature(parameters)

@@ -10,6 +10,8 @@ from math import exp
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from drivetwin._util.visible_text import escape_json
 from drivetwin.errors import DrivetwinError
 from drivetwin.findings import Finding
@@ -18,7 +20,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from drivetwin.report.blocks import Block
+    from drivetwin.report.outcome import Outcome
 
+NOT_CONFIRMED = 3
+"""Exit code of a result that is not confirmed, with --strict."""
 _QUIET = 1.0
 """Time [s] for which a step is shown without numbers: most are over by then."""
 _EARLY = 0.05
@@ -123,6 +128,38 @@ def print_json(value: Mapping[str, Any]) -> None:
     from drivetwin._util.plain_values import format_json
 
     sys.stdout.write(escape_json(format_json(dict(value))))
+
+
+def deliver(outcomes: Iterable[Outcome], *, as_json: bool, strict: bool) -> None:
+    """Print each outcome when it is there, or all as one JSON document.
+
+    Exits with the code of a fault, and with `NOT_CONFIRMED` if one is not confirmed and `strict`.
+    """
+    made = []
+    for one in outcomes:
+        made.append(one)
+        if as_json:
+            continue
+        print_blocks(one.blocks)
+        for line in (*one.lines, *(f"wrote {file}" for file in one.files)):
+            print_line(line)
+        if one.fault is not None:
+            show_error(one.fault, as_json=False)
+    if as_json:
+        documents = [_build_document(one) for one in made]
+        print_json(documents[0] if len(documents) == 1 else {"results": documents})
+    for one in reversed(made):
+        if one.fault is not None:
+            raise typer.Exit(one.fault.exit_code)
+    if strict and not all(one.is_confirmed for one in made):
+        raise typer.Exit(NOT_CONFIRMED)
+
+
+def _build_document(one: Outcome) -> dict[str, Any]:
+    if one.document is None and one.fault is not None:
+        return to_error_document(one.fault)
+    files = {"files": [str(file) for file in one.files]} if one.files else {}
+    return {**(one.document or {}), **files}
 
 
 @contextmanager

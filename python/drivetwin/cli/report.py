@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 from drivetwin._util.outputs import PAGE
 from drivetwin._util.request import Request, argument, output_file
-from drivetwin.cli.arguments import REPORT, RESULT, mapping_option, read_twin_log
-from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
-from drivetwin.errors import InputError, ResultFileError, Where
+from drivetwin.cli.arguments import mapping_option, read_twin_log
+from drivetwin.cli.output import show_step
+from drivetwin.errors import InputError, Where
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
-    from drivetwin.report.find_reports import Candidate, Trial
+    from drivetwin.report.find_reports import Trial
+    from drivetwin.report.results import MadeResult
     from drivetwin.twin.twin import Twin
 
 
@@ -22,7 +24,7 @@ class Report(Request, command="report"):
     """Arguments of `report`."""
 
     sources: tuple[Path, ...] = argument(
-        "Folders of 'identify -o', result.json, twin.toml, or logs.", "SOURCE..."
+        "Folders of identify, examine or fit, their results, twin.toml, or logs.", "SOURCE..."
     )
     output: Path = output_file(
         "Page with the comparison.", "FILE.html", PAGE, Path("comparison.html")
@@ -30,15 +32,18 @@ class Report(Request, command="report"):
     channels: Path | None = mapping_option()
 
 
-def report(request: Report, *, as_json: bool) -> None:
-    """Print the path of a report, or compare several identifications.
+def report(request: Report) -> Outcome:
+    """Print the path of a report, or compare several results.
 
-    For one folder or result.json, print the path of its report. For several, or a twin and logs,
-    write a page that compares parameters, friction, and the simulation of each log by each twin.
+    For one result of identify, examine or fit, print its verdict and the path of its report. For
+    several, or a twin and logs, write a page that compares parameters, friction, and the simulation
+    of each log by each twin.
     """
+    from drivetwin.report.results import open_result
+
     sources, output = request.sources, request.output
-    made = [source for source in sources if _is_identification(source)]
-    logs = [source for source in sources if not _is_identification(source)]
+    made = [source for source in sources if _is_result(source)]
+    logs = [source for source in sources if not _is_result(source)]
     if not made:
         raise InputError(
             "this is no result of an identification",
@@ -46,68 +51,54 @@ def report(request: Report, *, as_json: bool) -> None:
             Where(file=str(sources[0])),
         )
     if len(sources) == 1:
-        if made[0].suffix == ".toml":
-            raise InputError(
-                "a twin alone has nothing to be compared with",
-                "name further twins, or logs to simulate",
-                Where(file=str(made[0])),
-            )
-        _print_page_name(made[0], as_json=as_json)
-        return
+        return _find_report(open_result(made[0]))
     _write_comparison(made, logs, request.channels, output)
-    if as_json:
-        print_json({"report": output, "compared": made, "logs": logs})
-        return
-    print_line(f"wrote {output}")
+    return Outcome((), {"report": output, "compared": made, "logs": logs}, [output])
 
 
-def _is_identification(source: Path) -> bool:
-    """Return True if a source was written by an identification; all others are read as logs."""
+def _is_result(source: Path) -> bool:
+    """Return True if a command wrote a source; all others are read as logs."""
     return source.is_dir() or source.suffix in (".json", ".toml")
 
 
-def _print_page_name(source: Path, *, as_json: bool) -> None:
-    """Print verdict and path of the report of an identification."""
-    from drivetwin.files.result_file import load_result
-    from drivetwin.report.model_verdict import build_verdict_block, explain_result
-
-    result = source / RESULT if source.is_dir() else source
-    content = load_result(result)
-    page = result.with_name(REPORT)
-    if not page.is_file():
-        raise ResultFileError(
-            f"{REPORT} is not in the folder of {result.name}",
-            "write all three files again with 'drivetwin identify LOG --vehicle CARD -o DIR'",
-            Where(file=str(page)),
+def _find_report(made: MadeResult) -> Outcome:
+    """Return verdict and path of the report of a result."""
+    verdict = made.build_verdict()
+    if verdict is None:
+        raise InputError(
+            "a twin alone has nothing to be compared with",
+            "name further twins, or logs to simulate",
+            Where(file=str(made.file)),
         )
-    verdict = explain_result(content)
-    if as_json:
-        print_json(
-            {"report": page, "result": result, "inputs": content.inputs, "verdict": vars(verdict)}
-        )
-        return
-    print_blocks([build_verdict_block(verdict)])
-    print_line(str(page))
+    page = made.find_page()
+    words = {name: getattr(verdict, name) for name in ("status", "reason", "action")}
+    document = {"report": page, "result": made.file, "verdict": words}
+    return Outcome([verdict], document, lines=[str(page)])
 
 
 def _write_comparison(
     made: Sequence[Path], logs: Sequence[Path], channels: Path | None, output: Path
 ) -> None:
     from drivetwin.report.comparison import save_comparison
+    from drivetwin.report.results import open_result
 
-    names = _assign_names(made)
     with show_step("reading"):
-        candidates = [_load_candidate(name, source) for name, source in names.items()]
-        twins = {name: _load_twin(source) for name, source in names.items()} if logs else {}
+        opened = {name: open_result(source) for name, source in _assign_names(made).items()}
+        candidates = [one.to_candidate(name) for name, one in opened.items()]
+        twins = {name: one.load_twin() for name, one in opened.items()} if logs else {}
     trials = [trial for log in logs for trial in _simulate_trials(twins, log, channels)]
     with show_step(f"writing {output.name}"):
         save_comparison(output, candidates, trials)
 
 
+_PLAIN_NAMES = ("result", "bus", "fit", "twin")
+"""Names of files that do not name their origin."""
+
+
 def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
     """Name each source by its folder or file; number the names that occur twice."""
     plain = [
-        (source if source.is_dir() or source.stem not in ("result", "twin") else source.parent)
+        source.parent if source.is_file() and source.stem in _PLAIN_NAMES else source
         for source in made
     ]
     names: dict[str, Path] = {}
@@ -119,23 +110,6 @@ def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
             name = f"{called} {number}"
         names[name] = source
     return names
-
-
-def _load_candidate(name: str, source: Path) -> Candidate:
-    from drivetwin.files.result_file import load_result
-    from drivetwin.report.find_reports import Candidate
-
-    if source.suffix == ".toml":
-        return Candidate.from_twin(name, _load_twin(source))
-    return Candidate.from_result(name, load_result(source / RESULT if source.is_dir() else source))
-
-
-def _load_twin(source: Path) -> Twin:
-    """Load the twin of a source: the file itself, or the twin file next to its result."""
-    from drivetwin.cli.file_kinds import find_twin
-    from drivetwin.files.twin_file import load_twin
-
-    return load_twin(find_twin(source))
 
 
 def _simulate_trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:

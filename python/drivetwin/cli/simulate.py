@@ -9,18 +9,23 @@ from typing import TYPE_CHECKING
 
 from drivetwin._util.outputs import PAGE, select_outputs
 from drivetwin._util.request import flag, input_file, option, output_file
-from drivetwin.cli.arguments import TwinLogInput, read_twin_log
-from drivetwin.cli.output import print_blocks, print_findings, print_json, print_line, show_step
+from drivetwin.cli.arguments import MODEL, TwinLogInput, read_twin_log, result_argument
+from drivetwin.cli.output import print_line, show_step
+from drivetwin.errors import InputError, Where
 from drivetwin.export.targets import DEFAULT_STEP, InputKind
+from drivetwin.report.blocks import Block
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.estimation.result.validation import Validation
+    from drivetwin.report.results import MadeResult
     from drivetwin.twin.twin import Twin
 
 
 class Simulate(TwinLogInput, command="simulate"):
     """Arguments of `simulate`."""
 
+    twin: Path = result_argument()
     output: tuple[Path, ...] = output_file(
         "Measured and simulated signals: .csv as a table side by side (SI), .html as a page with "
         "plots; repeatable.",
@@ -41,24 +46,35 @@ class Simulate(TwinLogInput, command="simulate"):
     from_command: bool = flag(
         "Compute pressures from the commands in the log by the actuators of the twin."
     )
-    template: Path | None = input_file("Template by which the file of --parameters was exported.")
+    template: Path | None = input_file(
+        "Template by which the file of --parameters was exported.", needs=("parameters",)
+    )
 
 
-def simulate(request: Simulate, *, as_json: bool) -> None:
+def simulate(request: Simulate) -> Outcome:
     """Simulate the shifts of a log with an identified model and compare.
 
     The inputs are the measured engine torque and pressures. The log can differ from the log of the
     identification. Ratios and shift elements are those of the twin; a vehicle card is not needed.
+    The result of a fit simulates the recording as a whole by its model.toml.
     """
+    from drivetwin.report.results import open_result
+
+    made = open_result(request.twin)
+    return _simulate_fit(made, request) if made.is_fit else _simulate_twin(made, request)
+
+
+def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
+    """Simulate every shift of a log by a twin, and write tables and pages."""
     from drivetwin._util.atomic import write_text
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
-    from drivetwin.files.twin_file import load_twin
+    from drivetwin.report.sections.findings import build_findings_section
     from drivetwin.report.sections.fits import build_fit_table
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.command_pressures import replace_pressures
     from drivetwin.validation.simulate_log import format_signals, simulate_shift
 
-    model, log = load_twin(request.twin), request.log
+    model, log = made.load_twin(), request.log
     if request.parameters is not None:
         model = _apply_parameters(model, request.parameters, request.template)
     recording, card = read_twin_log(model, log, request.vehicle, request.channels)
@@ -77,15 +93,45 @@ def simulate(request: Simulate, *, as_json: bool) -> None:
     for page in select_outputs(request.output, *PAGE):
         with show_step(f"writing {page.name}"):
             _write_page(page, model, runs, log.name)
-    if as_json:
-        print_json({"shifts": [_to_document(run) for run in runs]})
-        return
+    blocks: list[Block] = []
     for run in runs:
-        title = f"Shift {run.shift.name}: {run.status}"
-        print_blocks([build_fit_table(run.fit, title)])
-        print_findings(run.findings)
-    for file in request.output:
-        print_line(f"wrote {file}")
+        blocks.append(build_fit_table(run.fit, f"Shift {run.shift.name}: {run.status}"))
+        blocks += build_findings_section(run.findings).blocks
+    return Outcome(blocks, {"shifts": [_to_document(run) for run in runs]}, request.output)
+
+
+def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
+    """Simulate a recording by a fitted model with the start adapted, and write pages."""
+    from dataclasses import asdict
+
+    from drivetwin._util.atomic import write_text
+    from drivetwin.cli.fit import read_recordings
+    from drivetwin.fit.fit import predict_recording
+    from drivetwin.fit.model_file import read_model
+    from drivetwin.report.fit import build_prediction_blocks, render_prediction
+    from drivetwin.report.sections.findings import build_findings_section
+
+    allowed = {"twin", "log", "output"}
+    request.refuse_stated(
+        {one for one in request.stated if one not in allowed},
+        "the model of a fit has its own channels and inputs",
+    )
+    tables = select_outputs(request.output, ".csv")
+    if tables:
+        what = "a table of signals is written of the shifts of a twin"
+        raise InputError(what, "name a page, .html", Where(file=str(tables[0])))
+    network, channels = read_model(made.file.with_name(MODEL))
+    with show_step(f"simulating {request.log.name}"):
+        (recording,), findings = read_recordings([request.log], network, channels)
+        found = predict_recording(network, made.list_spreads(network), recording)
+    for page in select_outputs(request.output, *PAGE):
+        write_text(page, render_prediction(found, network.name, request.log.name))
+    blocks = [
+        *build_prediction_blocks(found, request.log.name),
+        *build_findings_section(findings).blocks,
+    ]
+    fit = {name: asdict(one) for name, one in found.agreement.items()}
+    return Outcome(blocks, {"fit": fit, "chi2": found.chi2}, request.output)
 
 
 def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) -> None:

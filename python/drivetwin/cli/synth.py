@@ -48,6 +48,7 @@ class Synthesize(Bench, command="synth"):
         "Model file of 'drivetwin fit' with a manoeuvre, in place of a scenario: a file, or "
         "engine_start, tip_in, converter_lock_up.",
         metavar="MODEL",
+        excludes=("scenario", "torque_reduction", "drum", "effect"),
     )
     torque_reduction: float = option(
         "Share by which the engine torque is reduced in the inertia phase.", default=0.0

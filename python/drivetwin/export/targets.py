@@ -68,6 +68,11 @@ class Target(StrEnum):
     M = "m", "MATLAB", "script with all parameters"
     CSV = "csv", "CSV", "parameters with units and intervals as a table"
 
+    @property
+    def is_model(self) -> bool:
+        """True for a model of the shift, false for a parameter file."""
+        return self in (Target.C, Target.FMU, Target.MODELICA)
+
     def __new__(cls, value: str, label: str = "", text: str = "", ending: str = "") -> Self:
         """Make a member of its name on the command line and the words for it."""
         member = str.__new__(cls, value)

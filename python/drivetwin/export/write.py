@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -71,24 +71,37 @@ def write_export(
             model = load()
             write_modelica(model.subject, model.experiment, path)
         case _:
-            return _write_parameters(twin, options, path)
+            return _write_twin_parameters(twin, options, path)
     return model
 
 
-def _write_parameters(twin: Twin, options: ExportOptions, path: Path) -> ParameterSet:
-    """Write a parameter file, in the layout of a template if one is given; return its contents."""
+def _write_twin_parameters(twin: Twin, options: ExportOptions, path: Path) -> ParameterSet:
+    """Write the parameters of a twin; return them."""
     from drivetwin.drive import load_powertrain
-    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
     from drivetwin.export.parameters.of_twin import collect_parameters
-    from drivetwin.export.parameters.template import apply_template, read_template, require_labels
 
     powertrain = options.powertrain
     converter = None if powertrain is None else load_powertrain(powertrain).converter
+    unvalued = [one.id for one in twin.parameters.values() if one.value is None]
     content = collect_parameters(twin, options.names, converter)
+    return write_content(content, unvalued, options, path)
+
+
+def write_content(
+    content: ParameterSet, unvalued: Collection[str], options: ExportOptions, path: Path
+) -> ParameterSet:
+    """Write a parameter file; return its contents.
+
+    A template gives layout and units. Without one, files of calibration tools are in bar and rpm.
+    """
+    from drivetwin.export.parameters.files import ParameterFormat, show_units, write_parameters
+    from drivetwin.export.parameters.template import apply_template, read_template, require_labels
+
     kind = ParameterFormat(options.to.value)
-    if options.template is not None:
+    if options.template is None:
+        content = show_units(content, kind)
+    else:
         template = read_template(options.template)
-        unvalued = [one.id for one in twin.parameters.values() if one.value is None]
         content = apply_template(content, template, unvalued)
         require_labels(content, template, kind)
     write_parameters(content, path, kind)

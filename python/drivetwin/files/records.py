@@ -92,9 +92,13 @@ class Record(BaseModel):
         """Build the record and those of its parts from the attributes of the fields' names."""
         return cls.model_validate(result, from_attributes=True, by_alias=True, by_name=True)
 
+    def to_document(self) -> dict[str, Any]:
+        """Return the record as JSON values, keys as in the published schema."""
+        return self.model_dump(mode="json", by_alias=True)
+
     def to_json(self) -> str:
         """Return strict JSON text: no NaN, keys as in the published schema."""
-        return format_json(self.model_dump(mode="json", by_alias=True))
+        return format_json(self.to_document())
 
 
 class FrictionRecord(Record):
@@ -474,7 +478,7 @@ def write_toml(path: Path | str, comments: Iterable[str], content: Record) -> No
     document = tomlkit.document()
     for line in comments:
         document.add(tomlkit.comment(line))
-    for key, value in _drop_null(content.model_dump(mode="json", by_alias=True)).items():
+    for key, value in _drop_null(content.to_document()).items():
         document.add(key, tomlkit.item(value))
     write_text(path, tomlkit.dumps(document))
 

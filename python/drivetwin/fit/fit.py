@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError, InputError, suggest_spelling
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.gauss_newton import minimise
@@ -264,10 +265,12 @@ _HELD = 1e-4
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """Prediction of one recording by the values of a fit: agreement by output, Q per sample by the
-    sensors' noise and that of the inputs."""
+    sensors' noise and that of the inputs. `term` simulates the recording at `point`."""
 
     agreement: Mapping[str, SignalFit]
     chi2: float
+    term: NetworkTerm
+    point: ParameterVector
 
 
 def predict(found: ModelFit, recordings: Sequence[Recording]) -> tuple[HeldOut, ...]:
@@ -290,25 +293,29 @@ def predict(found: ModelFit, recordings: Sequence[Recording]) -> tuple[HeldOut, 
     IdentificationError
         Where a recording cannot be simulated.
     """
-    held = []
-    for recording in recordings:
-        problem, point, numbers = build_problem(found.fitted, [recording])
-        count = len(numbers.sought)
-        mean, precision = problem.prior.mean.copy(), problem.prior.precision.copy()
-        mean[:count] = found.minimum.point.values[:count]
-        spread = np.sqrt(np.diag(found.covariance)[:count])
-        precision[:count, :count] = np.diag((_HELD * spread) ** -2.0)
-        values = np.concatenate([mean[:count], point.values[count:]])
-        prior = Prior(mean, precision)
-        problem, point = replace(problem, prior=prior), point.replace_values(values)
-        rough = minimise(problem, point, rough=True)
-        end = rough and minimise(problem.update_weighting(rough.point), rough.point)
-        if not end:
-            raise IdentificationError(
-                "a recording that was held out cannot be simulated with the values of the fit",
-                "check that it is of the same driveline, and its start",
-            )
-        term = end.problem.terms[0]
-        cost = end.normal.cost - prior.compute_prior_cost(end.point.values)
-        held.append(HeldOut(term.compare(end.point), cost / end.problem.size))
-    return tuple(held)
+    spread = np.sqrt(np.diag(found.covariance)[: len(found.sought)])
+    return tuple(predict_recording(found.fitted, spread, one) for one in recordings)
+
+
+def predict_recording(model: NetworkModel, spread: FloatArray, recording: Recording) -> HeldOut:
+    """Predict a recording with the values of a fitted model; only its start is adapted.
+
+    `spread` (n,) are the standard deviations of the unknowns in their coordinates: the logarithm
+    of a number that is positive. Raises IdentificationError as `predict` does.
+    """
+    problem, point, numbers = build_problem(model, [recording])
+    count = len(numbers.sought)
+    mean, precision = problem.prior.mean.copy(), problem.prior.precision.copy()
+    mean[:count] = point.values[:count]
+    precision[:count, :count] = np.diag((_HELD * spread) ** -2.0)
+    problem = replace(problem, prior=Prior(mean, precision))
+    rough = minimise(problem, point, rough=True)
+    end = rough and minimise(problem.update_weighting(rough.point), rough.point)
+    if not end:
+        raise IdentificationError(
+            "a recording that was held out cannot be simulated with the values of the fit",
+            "check that it is of the same driveline, and its start",
+        )
+    term = end.problem.terms[0]
+    cost = end.normal.cost - problem.prior.compute_prior_cost(end.point.values)
+    return HeldOut(term.compare(end.point), cost / end.problem.size, term, end.point)

@@ -101,12 +101,13 @@ class TilesBlock:
 
 @dataclass(frozen=True)
 class VerdictBlock:
-    """Verdict on a model in a coloured box: status, reason and next action."""
+    """Verdict on a result in a coloured box: status, reason and next action."""
 
     status: str
     reason: str
     action: str
     tone: Tone
+    subject: str = "Model"
     kind: str = field(default="verdict", init=False)
 
 

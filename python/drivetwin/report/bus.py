@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from drivetwin._util.display_units import RPM, format_uncertainty
 from drivetwin.bus.decay import DecayPrediction, JointDecay
 from drivetwin.bus.identify import BusIdentification
 from drivetwin.bus.phases import Timeline
-from drivetwin.estimation.result.estimate import Z95, Verdict
-from drivetwin.findings import Finding
+from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
+from drivetwin.findings import Code, Finding, explain
 from drivetwin.report.blocks import (
     Block,
     FigureBlock,
@@ -20,11 +21,14 @@ from drivetwin.report.blocks import (
     TableBlock,
     Tile,
     TilesBlock,
+    Tone,
+    VerdictBlock,
     make_table,
 )
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.html import render_page
+from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import BAND, MEASURED, OVER, SIMULATED, UNDER
@@ -49,8 +53,14 @@ def render_bus(
 
 def build_bus_sections(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Section]:
     """Build the sections of a result: quantities, findings, shifts, decays, predictions."""
+    verdict = explain_bus_identification(found).block
     sections = [
-        Section("result", "Result", "", [_build_tiles(found), *_build_parameters(found)]),
+        Section(
+            "result",
+            "Result",
+            "",
+            [verdict, _build_tiles(found), *_build_parameters(found)],
+        ),
         build_findings_section((*remarks, *found.findings)),
         Section(
             "shifts",
@@ -82,8 +92,9 @@ def build_bus_sections(found: BusIdentification, remarks: Sequence[Finding] = ()
 
 
 def build_bus_blocks(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Block]:
-    """Quantities, shifts with phases, agreement of the decays, predictions, and findings."""
+    """Verdict, quantities, shifts with phases, decays, predictions, and findings."""
     return [
+        explain_bus_identification(found).block,
         *_build_parameters(found),
         build_phase_table(found.timelines),
         *_build_energies(found),
@@ -92,6 +103,61 @@ def build_bus_blocks(found: BusIdentification, remarks: Sequence[Finding] = ()) 
         *_build_prediction_table(found),
         *build_findings_section((*remarks, *found.findings)).blocks,
     ]
+
+
+@dataclass(frozen=True)
+class BusVerdict:
+    """Verdict on the quantities of bus logs; it is confirmed if some are identified and no shift
+    contradicts the others."""
+
+    block: VerdictBlock
+    is_confirmed: bool
+
+
+def explain_bus(
+    estimates: Mapping[str, Estimate], findings: Sequence[Finding], inside: Sequence[float]
+) -> BusVerdict:
+    """Explain a result; `inside` are the shares of predicted samples inside the 95 % band."""
+    verdicts = [one.verdict for one in estimates.values()]
+    count = verdicts.count(Verdict.IDENTIFIED)
+    status = f"{count} of {len(verdicts)} quantities identified"
+    contradictions = [one for one in findings if one.code is Code.BUS_SHIFTS_CONTRADICT]
+    if contradictions:
+        worst = min(contradictions, key=lambda one: one.numbers["p"].value)
+        reason = f"{len(contradictions)} times a shift contradicts the others. {worst.cause}"
+        action, tone = worst.remedy, Tone.DOUBTFUL
+    else:
+        reason, action, tone = _explain_agreement(estimates, count)
+    if inside:
+        reason += (
+            f" {len(inside)} held-out decays were predicted: {100.0 * float(np.mean(inside)):.0f} "
+            "% of their samples are inside the 95 % band."
+        )
+    return BusVerdict(VerdictBlock(status, reason, action, tone, "Bus logs"), tone is Tone.GOOD)
+
+
+def explain_bus_identification(found: BusIdentification) -> BusVerdict:
+    """Explain the result of an identification."""
+    inside = [one.share_inside for one in found.predictions.values()]
+    return explain_bus(found.estimates, found.findings, inside)
+
+
+def _explain_agreement(estimates: Mapping[str, Estimate], count: int) -> tuple[str, str, Tone]:
+    """Return reason, next step and colour of a result without contradictions."""
+    open_ids = [
+        name
+        for name, one in estimates.items()
+        if one.verdict in (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
+        and one.reason != explain(Code.BUS_NO_METER)
+    ]
+    wanted = next((estimates[name].reason for name in open_ids if estimates[name].reason), "")
+    if not count:
+        return "No quantity is determined by these logs.", wanted, Tone.BAD
+    reason = "The shifts agree with each other within the intervals."
+    action = "Use the identified values; speeds and engine torque give no clutch model to simulate."
+    if wanted:
+        action += f" First of the others, {get_parameter_label(open_ids[0])}: {wanted}"
+    return reason, action, Tone.GOOD
 
 
 def _build_tiles(found: BusIdentification) -> TilesBlock:

@@ -13,7 +13,13 @@ from drivetwin.errors import InputError
 from drivetwin.files.bus_file import BusFile, build_bus_file
 from drivetwin.findings import Finding
 from drivetwin.report.blocks import Block, Section
-from drivetwin.report.bus import build_bus_blocks, build_bus_sections, render_bus
+from drivetwin.report.bus import (
+    BusVerdict,
+    build_bus_blocks,
+    build_bus_sections,
+    explain_bus_identification,
+    render_bus,
+)
 from drivetwin.vehicle.ratio_card import RatioCard
 
 
@@ -28,6 +34,11 @@ class BusOutcome:
     def build_file(self, settings: Mapping[str, str] | None = None) -> BusFile:
         """Build the result file with the settings of the run."""
         return build_bus_file(self.found, self.logs, self.remarks, settings)
+
+    @property
+    def verdict(self) -> BusVerdict:
+        """Verdict on the quantities."""
+        return explain_bus_identification(self.found)
 
     def build_blocks(self) -> list[Block]:
         """Build the blocks of the terminal."""

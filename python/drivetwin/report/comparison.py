@@ -40,9 +40,9 @@ from drivetwin.report.figures.comparison import (
 )
 from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
 from drivetwin.report.html import render_page
-from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.labels import get_estimate_label
 from drivetwin.report.sections.fits import build_labelled_fits
-from drivetwin.report.sections.parameters import make_parameter_cell, make_value_cell
+from drivetwin.report.sections.parameters import make_estimate_cell, make_value_cell
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import SIGNALS, simulate_shift
@@ -106,7 +106,7 @@ def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
     differing = [one for one in judged if not one.agrees]
     blocks: list[Block] = [TilesBlock(_build_tiles(candidates, judged, differing))]
     texts = [
-        f"{get_parameter_label(one.id)}: {format_significant(one.apart or 0.0, 2)} "
+        f"{get_estimate_label(one.known)}: {format_significant(one.apart or 0.0, 2)} "
         f"standard deviations"
         for one in differing
     ]
@@ -136,7 +136,7 @@ def _build_tiles(
 ) -> list[Tile]:
     tone = Tone.DOUBTFUL if differing else Tone.GOOD
     tiles = [
-        Tile("compared", str(len(candidates)), note="identifications"),
+        Tile("compared", str(len(candidates)), note="results"),
         Tile("agree", f"{len(judged) - len(differing)} of {len(judged)}", tone, "parameters"),
     ]
     for one in candidates:
@@ -155,10 +155,10 @@ def _build_parameter_table(
 ) -> TableBlock:
     rows = []
     for one in found:
-        display = get_display_unit(next(each.unit for each in one.estimates if each is not None))
+        display = get_display_unit(one.known.unit)
         values = (make_value_cell(each, display) for each in one.estimates)
         verdict = _make_verdict_cell(one, candidates)
-        rows.append((make_parameter_cell(one.id), *values, display.label, one.apart, verdict))
+        rows.append((make_estimate_cell(one.known), *values, display.label, one.apart, verdict))
     names = (make_number(one.name, "± 95 % total") for one in candidates)
     columns: Sequence[Column] = ("parameter", *names, "unit", ("apart", "2", "σ"), "verdict")
     return make_table("Parameters side by side.", columns, rows)

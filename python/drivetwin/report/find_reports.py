@@ -10,7 +10,6 @@ import numpy as np
 
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.files.result_file import ResultFile
 from drivetwin.twin.twin import Twin
 
 DIFFER = 2.58
@@ -36,30 +35,6 @@ class Candidate:
     def from_twin(cls, name: str, twin: Twin) -> Candidate:
         """Create a candidate from a twin file."""
         return cls(name, twin.method, twin.parameters, twin.friction, {}, twin.inputs, twin.version)
-
-    @classmethod
-    def from_result(cls, name: str, content: ResultFile) -> Candidate:
-        """Create a candidate from a result file."""
-        nan = float("nan")
-        fit = {
-            signal: {
-                phase: SignalFit(
-                    nan if one.rmse is None else one.rmse,
-                    nan if one.fit_percent is None else one.fit_percent,
-                )
-                for phase, one in phases.items()
-            }
-            for signal, phases in content.fit.items()
-        }
-        return cls(
-            name,
-            content.method,
-            {key: record.to_estimate(key) for key, record in content.parameters.items()},
-            {element: record.to_curve() for element, record in content.friction.items()},
-            fit,
-            content.inputs,
-            content.version,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +63,11 @@ class Agreement:
     estimates: tuple[Estimate | None, ...]
     mean: float
     apart: float | None
+
+    @property
+    def known(self) -> Estimate:
+        """Estimate of the first candidate that has one."""
+        return next(one for one in self.estimates if one is not None)
 
     @property
     def bare(self) -> tuple[int, ...]:

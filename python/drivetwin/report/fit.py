@@ -15,7 +15,7 @@ from drivetwin._util.display_units import (
 )
 from drivetwin.channels.roles import Quantity
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.result.estimate import Z95
+from drivetwin.estimation.result.estimate import Z95, SignalFit
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.fit import HeldOut
@@ -28,6 +28,7 @@ from drivetwin.report.blocks import (
     FigureBlock,
     Section,
     TableBlock,
+    TextBlock,
     VerdictBlock,
     make_table,
 )
@@ -38,7 +39,7 @@ from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import MEASURED, MUTED, OVER, SIMULATED, UNDER
-from drivetwin.simulation.network import NetworkRun
+from drivetwin.simulation.network import NetworkRun, Output
 
 _HEIGHT = 190
 """Height of a panel [px]."""
@@ -61,9 +62,10 @@ def render_fit(
     """HTML text of the page; equal fits give equal text."""
     terms = zip(logs, found.problem.terms, found.simulate(), strict=True)
     point = found.minimum.point
+    verdict = build_fit_verdict(found.status, found.chi2)
     figures = [FigureBlock(plot_recording(term, point, run), f"{log}.") for log, term, run in terms]
     sections = [
-        Section("result", "Result", "", [_build_verdict(found), *_build_parameters(found)]),
+        Section("result", "Result", "", [verdict, *_build_parameters(found)]),
         build_findings_section((*remarks, *found.findings)),
         Section(
             "recordings",
@@ -91,7 +93,7 @@ def build_fit_blocks(
 ) -> list[Block]:
     """Verdict, parameters, agreement with the recordings, minima of the search, and findings."""
     return [
-        _build_verdict(found),
+        build_fit_verdict(found.status, found.chi2),
         *_build_parameters(found),
         _build_agreement_table(found, logs, held_out),
         _build_start_table(found),
@@ -99,10 +101,28 @@ def build_fit_blocks(
     ]
 
 
-def _build_verdict(found: ModelFit) -> VerdictBlock:
+def build_prediction_blocks(found: HeldOut, log: str) -> list[Block]:
+    """Build the agreement of a prediction with the recording."""
     size = format_significant(found.chi2, 3)
-    reason = f"The mean squared residual is {size} of the noise."
-    return build_verdict_block(ModelVerdict(found.status, reason, _ACTIONS[found.status]))
+    outputs = found.term.plant.outputs
+    return [
+        TextBlock(f"The mean squared residual is {size} of the noise."),
+        _tabulate_agreement(outputs, {log: found.agreement}),
+    ]
+
+
+def render_prediction(found: HeldOut, model: str, log: str) -> str:
+    """HTML text of the page of a recording that a fitted model predicts."""
+    figure = plot_recording(found.term, found.point, found.term.simulate(found.point))
+    blocks = [*build_prediction_blocks(found, log), FigureBlock(figure, f"{log}.")]
+    section = Section("recordings", "Recording", "Measured and simulated quantities.", blocks)
+    return render_page(f"{model}: simulation of {log}", "by the values of a fit", [section])
+
+
+def build_fit_verdict(status: ModelStatus, chi2: float) -> VerdictBlock:
+    """Build the verdict on a fit from its status and Q per sample."""
+    reason = f"The mean squared residual is {format_significant(chi2, 3)} of the noise."
+    return build_verdict_block(ModelVerdict(status, reason, _ACTIONS[status]))
 
 
 def _build_parameters(found: ModelFit) -> list[Block]:
@@ -167,7 +187,12 @@ def _build_agreement_table(
 ) -> TableBlock:
     agreement = dict(zip(logs, found.agreement, strict=True))
     agreement |= {f"{name}, held out": one.agreement for name, one in held_out.items()}
-    outputs = found.problem.terms[0].plant.outputs
+    return _tabulate_agreement(found.problem.terms[0].plant.outputs, agreement)
+
+
+def _tabulate_agreement(
+    outputs: Mapping[str, Output], agreement: Mapping[str, Mapping[str, SignalFit]]
+) -> TableBlock:
     displays = {name: _get_display(get_output_quantity(one)) for name, one in outputs.items()}
     rows = [
         (log, name, one.fit_percent, one.rmse * displays[name].factor, displays[name].label)

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
-from textwrap import wrap
+from itertools import accumulate
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.table import Table
@@ -38,8 +39,8 @@ _WIDTH = 80
 """Width of a text that is not for a terminal."""
 _HEAD = 11
 """Width up to which the head of a column of numbers is not broken."""
-_WIDEST = 1000
-"""Width at which every table fits."""
+_BESIDE = 2
+"""Space between the texts of two columns."""
 
 
 def format_blocks(blocks: Iterable[Block], width: int = _WIDTH) -> str:
@@ -66,13 +67,13 @@ def _render_block(console: Console, block: Block) -> Iterator[RenderableType]:
         case FigureBlock():
             return
         case VerdictBlock():
-            yield Text(f"Model: {block.status}", style=f"bold {_STYLES[block.tone]}")
+            yield Text(f"{block.subject}: {block.status}", style=f"bold {_STYLES[block.tone]}")
             yield _indent(block.reason)
             yield _indent(block.action)
         case TableBlock():
             if block.caption:
                 yield Text(block.caption, style="italic")
-            yield _render_table(console, block)
+            yield from _render_tables(block, console.width)
             return
         case NotesBlock():
             yield Text(block.heading, style=f"bold {_STYLES[block.tone]}")
@@ -91,42 +92,64 @@ def _indent(text: str) -> RenderableType:
     return Padding(Text(text), (0, 0, 0, 2))
 
 
-def _render_table(console: Console, block: TableBlock) -> Table:
-    """Render a table, without its secondary columns where these do not fit."""
-    whole = _fill_table(block.head, block.rows)
-    room = console.options.update(max_width=_WIDEST)
-    if console.measure(whole, options=room).maximum <= console.width:
-        return whole
-    kept = [k for k, head in enumerate(block.head) if not head.secondary]
-    return _fill_table(
-        [block.head[k] for k in kept], [[row[k] for k in kept] for row in block.rows]
-    )
+def _render_tables(block: TableBlock, width: int) -> Iterator[Table]:
+    """Render a table, without its secondary columns where these do not fit.
+
+    One whose words do not fit side by side is divided; its first column stands in each part.
+    """
+    places = list(range(len(block.head)))
+    if sum(_measure(block, place)[1] for place in places) > width:
+        places = [place for place in places if not block.head[place].secondary]
+    while places:
+        needed = accumulate(_measure(block, place)[0] for place in places)
+        count = max(2, sum(one <= width for one in needed))
+        yield _fill_table(block, places[:count], width)
+        places = [places[0], *places[count:]] if places[count:] else []
 
 
-def _fill_table(head: Sequence[Cell], rows: Sequence[Sequence[Cell]]) -> Table:
-    """Fill a table in the one style; texts are folded, a number stays whole as long as it can."""
+def _measure(block: TableBlock, place: int) -> tuple[int, int]:
+    """Return the least width of a column, that of its longest word, and the width of its texts.
+
+    Both include the space beside it. A number is one word.
+    """
+    head = block.head[place]
+    cells = [escape_text(text) for row in block.rows for text in row[place].texts]
+    heads = [escape_text(text) for text in head.texts]
+    words = [word for text in heads for word in text.split()]
+    if head.number:
+        heads = [*words, *(text[:_HEAD] for text in heads)]
+        least = [*words, *cells]
+    else:
+        least = [*words, *(word for text in cells for word in text.split())]
+    widths = (max(map(cell_len, texts), default=0) for texts in (least, [*cells, *heads]))
+    smallest, whole = widths
+    return smallest + _BESIDE, whole + _BESIDE
+
+
+def _fill_table(block: TableBlock, places: Sequence[int], width: int) -> Table:
+    """Fill a table with some columns in the one style; texts are broken at words."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
-    for place, one in enumerate(head):
-        width = max((len(text) for row in rows for text in row[place].texts), default=0)
+    least, whole = (list(one) for one in zip(*(_measure(block, k) for k in places), strict=True))
+    free = width - sum(least)
+    if free < 0:  # one word is wider than the terminal
+        widest = least.index(max(least))
+        least[widest] = max(least[widest] + free, _BESIDE + 1)
+    order = sorted(range(len(places)), key=lambda k: whole[k] - least[k])
+    for rank, k in enumerate(order):
+        more = max(0, min(whole[k] - least[k], free // (len(order) - rank)))
+        least[k] += more
+        free -= more
+    for place, room in zip(places, least, strict=True):
+        head = block.head[place]
         table.add_column(
-            _render_head(one, width),
-            justify="right" if one.number else "left",
-            no_wrap=one.number,
+            Text("\n".join(escape_text(one) for one in head.texts)),
+            justify="right" if head.number else "left",
+            width=room - _BESIDE,
             overflow="fold",
         )
-    for row in rows:
-        table.add_row(*map(_render_cell, row))
+    for row in block.rows:
+        table.add_row(*(_render_cell(row[place]) for place in places))
     return table
-
-
-def _render_head(head: Cell, width: int) -> Text:
-    """Render a head; that of numbers is broken at words so that it is hardly wider than they."""
-    texts = [escape_text(one) for one in head.texts]
-    if head.number:
-        words = [word for text in texts for word in text.split()]
-        width = max([width, _HEAD, *map(len, words)])
-        texts = [line for text in texts for line in wrap(text, width)]
-    return Text("\n".join(texts))
 
 
 def _render_cell(cell: Cell) -> Text:

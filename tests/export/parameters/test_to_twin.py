@@ -11,7 +11,7 @@ import pytest
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.files import ParameterFormat
+from drivetwin.export.parameters.files import ParameterFormat, show_units
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.parameters.to_twin import update_twin
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
@@ -105,16 +105,25 @@ def test_a_curve_and_its_law_cannot_both_change() -> None:
         update_twin(twin(), both)
 
 
-def test_a_value_in_another_unit_is_refused() -> None:
-    """0.8 bar is not 0.8 Pa, and a slip in rpm not one in rad/s."""
+def test_values_in_bar_and_rpm_are_converted() -> None:
+    """Of calibration tools as they were written, and edited ones in Pa and rad/s."""
     content = collect_parameters(twin())
-    in_bar = Scalar("P0.B3", 0.8, "bar")
-    with pytest.raises(InputError, match=r"gives P0\.B3 in bar, not in Pa"):
-        update_twin(twin(), ParameterSet("t", (in_bar,)))
+    shown = show_units(content, ParameterFormat.DCM)
+    assert {one.unit for one in shown.scalars} >= {"bar", "rpm"}
+    assert {one.axis.unit for one in shown.curves} == {"rpm"}
+    assert update_twin(twin(), reread(shown, ParameterFormat.DCM)).changed == ()
+    update = update_twin(twin(), ParameterSet("t", (Scalar("P0.B3", 0.9, "bar"),)))
+    assert update.twin.get_value("P0.B3", 0.0) == pytest.approx(9e4)
+
+
+def test_a_value_in_another_unit_is_refused() -> None:
+    content = collect_parameters(twin())
+    with pytest.raises(InputError, match=r"gives P0\.B3 in psi, not in Pa"):
+        update_twin(twin(), ParameterSet("t", (Scalar("P0.B3", 12.0, "psi"),)))
     (curve,) = content.curves
-    in_rpm = replace(curve, axis=replace(curve.axis, unit="rpm"))
-    with pytest.raises(InputError, match=r"gives mu\.B3 in rpm, not in rad/s"):
-        update_twin(twin(), ParameterSet("t", (), (in_rpm,)))
+    in_hertz = replace(curve, axis=replace(curve.axis, unit="Hz"))
+    with pytest.raises(InputError, match=r"gives mu\.B3 in Hz, not in rad/s"):
+        update_twin(twin(), ParameterSet("t", (), (in_hertz,)))
     with pytest.raises(InputError, match="gives te_delay in ms, not in s"):
         update_twin(twin(), ParameterSet("t", (Scalar("te_delay", 10.0, "ms"),)))
 

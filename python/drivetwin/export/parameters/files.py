@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters import cdfx, csv_file, dcm, matlab, ssv
 from drivetwin.export.parameters.content import ParameterSet
+from drivetwin.export.parameters.spelling import choose_unit
 
 
 class ParameterFormat(StrEnum):
@@ -31,6 +33,28 @@ CODECS = {
     ParameterFormat.M: matlab.CODEC,
     ParameterFormat.CSV: csv_file.CODEC,
 }
+
+
+_FOR_PEOPLE = (ParameterFormat.CDFX, ParameterFormat.DCM)
+"""Formats of calibration tools, in which people read and edit numbers."""
+
+
+def show_units(content: ParameterSet, kind: ParameterFormat) -> ParameterSet:
+    """Return the contents in the units in which people read a format: bar and rpm, else SI."""
+    if kind not in _FOR_PEOPLE:
+        return content
+    scalars = []
+    for one in content.scalars:
+        unit, factor = choose_unit(one.unit)
+        scalars.append(replace(one, value=one.value * factor, unit=unit))
+    curves = []
+    for curve in content.curves:
+        unit, factor = choose_unit(curve.unit)
+        along, scale = choose_unit(curve.axis.unit)
+        axis = replace(curve.axis, points=tuple(scale * x for x in curve.axis.points), unit=along)
+        values = tuple(factor * value for value in curve.values)
+        curves.append(replace(curve, axis=axis, values=values, unit=unit))
+    return replace(content, scalars=tuple(scalars), curves=tuple(curves))
 
 
 @check_arguments

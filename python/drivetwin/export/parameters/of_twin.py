@@ -6,14 +6,14 @@ The mapping of variables to block fields is in docs/reference/parameter-files.md
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.spelling import to_one_line
+from drivetwin.export.parameters.spelling import choose_unit, to_one_line
 from drivetwin.export.targets import Names
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.twin.twin import build_friction_law
@@ -136,7 +136,7 @@ def collect_parameters(
     own = ParameterSet(
         name=to_one_line(twin.name),
         scalars=(
-            *_collect_estimates(twin),
+            *_collect_estimates(twin.parameters),
             *_collect_load_terms(twin),
             *_collect_gearing(twin),
             *_collect_elements(twin),
@@ -171,8 +171,20 @@ def build_converter_curves(converter: Converter) -> tuple[Curve, Curve]:
     )
 
 
-def _collect_estimates(twin: Twin) -> Iterator[Scalar]:
-    for estimate in twin.parameters.values():
+def collect_estimates(
+    name: str, estimates: Mapping[str, Estimate], notes: Iterable[str]
+) -> ParameterSet:
+    """Collect the estimates of a result without a twin; those without a value are in the notes."""
+    lines = (*notes, *_list_unvalued(estimates))
+    return ParameterSet(
+        name=to_one_line(name),
+        scalars=tuple(_collect_estimates(estimates)),
+        notes=tuple(map(to_one_line, lines)),
+    )
+
+
+def _collect_estimates(estimates: Mapping[str, Estimate]) -> Iterator[Scalar]:
+    for estimate in estimates.values():
         if estimate.value is not None:
             yield Scalar(
                 estimate.id,
@@ -188,10 +200,13 @@ def _list_estimated(twin: Twin) -> set[str]:
 
 def _describe_estimate(estimate: Estimate) -> str:
     """Meaning, verdict and interval; that of a value of the card has no width and is left out."""
-    text = f"{get_parameter_spec(estimate.id).meaning}; {estimate.verdict.value}"
+    spec = estimate.spec or get_parameter_spec(estimate.id)
+    text = f"{spec.meaning}; {estimate.verdict.value}"
     low, high = estimate.ci95_total or (0.0, 0.0)
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{text}, 95 %: {low:.5g} .. {high:.5g}{unit}" if low < high else text
+    unit, factor = choose_unit(estimate.unit)
+    shown = "" if unit == "1" else f" {unit}"
+    ends = f"{low * factor:.5g} .. {high * factor:.5g}{shown}"
+    return f"{text}, 95 %: {ends}" if low < high else text
 
 
 def _collect_load_terms(twin: Twin) -> Iterator[Scalar]:
@@ -267,7 +282,11 @@ def _collect_notes(twin: Twin) -> Iterator[str]:
     yield f"drivetwin {twin.version}, method {twin.method.value}, loss law {twin.loss_law}"
     for name, digest in twin.inputs.items():
         yield f"from {name}, SHA-256 {digest}"
-    for estimate in twin.parameters.values():
+    yield from _list_unvalued(twin.parameters)
+    yield from twin.assumptions
+
+
+def _list_unvalued(estimates: Mapping[str, Estimate]) -> Iterator[str]:
+    for estimate in estimates.values():
         if estimate.value is None:
             yield f"no value of {estimate.id}: {estimate.reason or estimate.verdict.value}"
-    yield from twin.assumptions

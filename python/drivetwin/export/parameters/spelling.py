@@ -8,6 +8,7 @@ import unicodedata
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 
+from drivetwin._util.display_units import BAR, RPM, get_display_unit
 from drivetwin.errors import InputError
 
 _GREEK = {
@@ -113,6 +114,12 @@ def to_tool_unit(unit: str) -> str:
 def parse_tool_unit(shown: str) -> str:
     """Inverse of `to_tool_unit`; nothing at all also means without dimension."""
     return "1" if shown.strip() in ("", "-") else shown.strip()
+
+
+def choose_unit(si: str) -> tuple[str, float]:
+    """Return the unit for people and its factor from SI; units but bar and rpm stay SI."""
+    display = get_display_unit(si)
+    return (display.label, display.factor) if display in (BAR, RPM) else (si, 1.0)
 
 
 def append_axis(text: str, axis: str) -> str:

@@ -12,7 +12,12 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, collect_parameters
-from drivetwin.export.parameters.spelling import is_same_unit, to_dotted_name, to_flat_name
+from drivetwin.export.parameters.spelling import (
+    choose_unit,
+    is_same_unit,
+    to_dotted_name,
+    to_flat_name,
+)
 from drivetwin.parameters import FINAL_DRIVE, get_parameter_spec, is_ratio, make_ratio_id
 from drivetwin.twin.twin import SIMULATED
 
@@ -53,13 +58,13 @@ def update_twin(twin: Twin, parameters: ParameterSet) -> Update:
     changed: dict[str, Scalar | Curve] = {}
     idle = []
     for name, entry in known.items():
-        _check(name, values.get(name), entry)
-        if _is_same(values.get(name), entry):
+        given = _convert_to_si(name, values.get(name), entry)
+        if given is None:
             continue
         if name in twin.parameters and get_parameter_spec(name).stem not in SIMULATED:
             idle.append(name)
         else:
-            changed[name] = entry
+            changed[name] = given
     made = twin
     for name, entry in changed.items():
         made = (
@@ -96,35 +101,47 @@ def _match_entries(
     return known, unknown
 
 
-def _check(name: str, own: Scalar | Curve | None, given: Scalar | Curve) -> None:
-    """Raise InputError for a value of another kind or unit, or a divisor of zero."""
+def _convert_to_si(
+    name: str, own: Scalar | Curve | None, given: Scalar | Curve
+) -> Scalar | Curve | None:
+    """Return an entry in SI; None if its numbers are the own ones in the unit of the file.
+
+    Raises InputError for a value of another kind or quantity, or a divisor of zero.
+    """
     kind = Curve if isinstance(own, Curve) else Scalar
     if not isinstance(given, kind):
         raise InputError(
             f"the file gives {name} as a {_KINDS[type(given)]}, not as a {_KINDS[kind]}",
             "give it as it was exported",
         )
-    unit = get_parameter_spec(name).unit if own is None else own.unit
-    pairs = [(given.unit, unit)]
-    if isinstance(own, Curve) and isinstance(given, Curve):
-        pairs.append((given.axis.unit, own.axis.unit))
-    for stated, expected in pairs:
-        if not is_same_unit(stated, expected):
-            raise InputError(
-                f"the file gives {name} in {stated}, not in {expected}",
-                f"convert its numbers to {expected} and state that",
-            )
+    size = _get_size(name, given.unit, get_parameter_spec(name).unit if own is None else own.unit)
     divides = name.partition(".")[0] in _DIVISORS or name.startswith("ratio_")
     if divides and isinstance(given, Scalar) and given.value == 0.0:
         raise InputError(f"{name} = 0 is impossible", "give it a value other than zero")
+    if isinstance(given, Scalar):
+        if isinstance(own, Scalar) and own.value * size == given.value:
+            return None
+        return replace(given, value=given.value / size)
+    assert isinstance(own, Curve)
+    along = _get_size(name, given.axis.unit, own.axis.unit)
+    shown = tuple(along * x for x in own.axis.points), tuple(size * y for y in own.values)
+    if shown == (given.axis.points, given.values):
+        return None
+    axis = replace(given.axis, points=tuple(point / along for point in given.axis.points))
+    return replace(given, axis=axis, values=tuple(value / size for value in given.values))
 
 
-def _is_same(own: Scalar | Curve | None, given: Scalar | Curve) -> bool:
-    if isinstance(own, Scalar) and isinstance(given, Scalar):
-        return own.value == given.value
-    if isinstance(own, Curve) and isinstance(given, Curve):
-        return (own.axis.points, own.values) == (given.axis.points, given.values)
-    return False
+def _get_size(name: str, stated: str, si: str) -> float:
+    """Return the factor from SI to a unit of a file: bar and rpm are known beside SI."""
+    unit, factor = choose_unit(si)
+    if stated == unit:
+        return factor
+    if is_same_unit(stated, si):
+        return 1.0
+    raise InputError(
+        f"the file gives {name} in {stated}, not in {si}",
+        f"convert its numbers to {si} and state that",
+    )
 
 
 def _set_number(twin: Twin, name: str, value: float) -> Twin:

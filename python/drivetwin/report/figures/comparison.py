@@ -13,7 +13,7 @@ from drivetwin.report.figures.friction import draw_band
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import OUTPUTS
 from drivetwin.report.find_reports import Agreement, Trial
-from drivetwin.report.labels import get_parameter_label
+from drivetwin.report.labels import get_estimate_label
 from drivetwin.report.style import MUTED, get_candidate_style, make_axis, make_layout
 
 _ROW = 0.7
@@ -46,13 +46,13 @@ def plot_agreement(names: Sequence[str], found: Sequence[Agreement]) -> Figure:
             },
             mode="markers",
             name=name,
-            text=[get_parameter_label(one.id) for _, _, _, one in points],
+            text=[get_estimate_label(one.known) for _, _, _, one in points],
             marker={"color": style.colour, "symbol": style.symbol, "size": 9},
             hovertemplate="%{text}: %{x:+.2f} σ<extra>" + name + "</extra>",
         )
     ticks = {
         "tickvals": list(range(len(shown))),
-        "ticktext": [get_parameter_label(one.id) for one in shown],
+        "ticktext": [get_estimate_label(one.known) for one in shown],
         "range": [len(shown) - 0.4, -0.6],
     }
     figure.set_layout(

@@ -87,26 +87,19 @@ def build_suggestion_blocks(
             reasons.setdefault(one.text, []).append(get_parameter_label(one.parameter))
         if best is None and number is None:
             continue
-        known = None if number is None else number.share * one.half_width
-        rows.append(
-            (
-                make_parameter_cell(one.parameter),
-                make_badge(one.verdict.value, TONES[one.verdict]),
-                format_half_width(one.half_width, unit),
-                None if best is None else one.text,
-                None if best is None else format_half_width(best.half_width, unit),
-                None if number is None else _name_number(number),
-                None if known is None else format_half_width(known, unit),
-            )
+        experiment = best and Cell(one.text, note=format_half_width(best.half_width, unit))
+        known = number and Cell(
+            _name_number(number), note=format_half_width(number.share * one.half_width, unit)
         )
+        now = format_half_width(one.half_width, unit)
+        badge = make_badge(one.verdict.value, TONES[one.verdict])
+        rows.append((make_parameter_cell(one.parameter), badge, now, experiment, known))
     columns = (
         "parameter",
         Cell("verdict", secondary=True),
         ("now", "s", "± 95 %"),
-        "experiment that would narrow it",
-        ("then", "s", "± 95 %, to expect"),
-        "best number to measure",
-        ("then", "s", "± 95 %, to expect"),
+        Cell("experiment that would narrow it", note="± 95 % then"),
+        Cell("best number to measure", note="± 95 % then"),
     )
     table = make_table(
         "Next recordings: each experiment was simulated with this model and the noise of this "

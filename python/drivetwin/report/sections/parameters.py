@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from drivetwin._util.display_units import (
     Display,
@@ -134,8 +135,7 @@ def _build_parameter_row(estimate: Estimate, mark: str) -> tuple[object, ...]:
     display = scale_display(get_display_unit(estimate.unit), estimate.value or 0.0)
     value, total = format_estimate(estimate, estimate.std_total, display)
     _, noise = format_estimate(estimate, estimate.std_noise, display)
-    is_symbol = get_estimate_label(estimate) == estimate.id
-    name = Cell(get_estimate_name(estimate), note="" if is_symbol else estimate.id)
+    name = replace(make_estimate_cell(estimate), text=get_estimate_name(estimate))
     verdict = make_badge(f"{estimate.verdict.value}{mark}", TONES[estimate.verdict])
     return name, value, total, noise, display.label, verdict, estimate.method
 
@@ -153,6 +153,12 @@ def make_parameter_cell(name: str) -> Cell:
     """Make the cell of a parameter: its symbol, and below it the id by which commands name it."""
     label = get_parameter_label(name)
     return Cell(label, note="" if label == name else name)
+
+
+def make_estimate_cell(one: Estimate) -> Cell:
+    """Make the cell of an estimate: its symbol, and below it the id by which commands name it."""
+    label = get_estimate_label(one)
+    return Cell(label, note="" if label == one.id else one.id)
 
 
 def make_value_cell(one: Estimate | None, display: Display) -> Cell:

@@ -52,7 +52,7 @@ def render_block(block: Block, name: str) -> Component:
 
 def _render_verdict(block: VerdictBlock) -> Component:
     parts = [
-        html.P(f"Model: {block.status}", className="word"),
+        html.P(f"{block.subject}: {block.status}", className="word"),
         html.P(block.reason),
         html.P([html.Strong("Next:"), f" {block.action}"]),
     ]
