@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.calibration.metrics import METRICS, Metric
-from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.objective import Limit, Statistic, build_limit_keys
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
-from drivetwin.files.limits_file import build_limit_keys, load_limits
+from drivetwin.files.limits_file import load_limits
 
 
 @given(st.dictionaries(st.sampled_from(sorted(build_limit_keys())), st.floats(1e-6, 1e9)))

@@ -48,8 +48,8 @@ LONG = {
 WITHOUT_COMMANDS = ("install.md", "read-the-report.md", "workbench.md")
 FRAGMENTS = ("bus-only.md", "many-runs.md", "notebook.md", "several-logs.md")
 """Pages with code that uses names of the reader; the notebooks of the examples run it whole."""
-HOURS = ("calibrate.md", "own-controller.md")
-"""Pages whose commands search for an hour; `tests/calibration` runs shorter ones."""
+HOURS = ("calibrate.md", "own-controller.md", "try-a-controller.md")
+"""Pages whose commands search for an hour; `tests/calibration` and `tests/cli` run shorter ones."""
 
 
 @pytest.mark.parametrize("name", SHORT)

@@ -113,7 +113,7 @@ class Plant:
             Runs(
                 batch.values[:, k],
                 batch.last_lock[:, k],
-                batch.inputs[:, k, :3] if wanted else None,
+                batch.inputs[:, k] if wanted else None,
             )
             for k in range(len(controls))
         ]

@@ -176,8 +176,8 @@ class Runs:
     """Runs with one control: `columns` (runs, outputs, n) as `list_outputs` orders them.
 
     `last_lock` (runs,) [s] is the time of the last lock-up, NaN without one. `inputs` (runs, 3, n)
-    or (1, 3, n) are engine torque [N m], off-going and on-coming pressure [Pa] at the clutches;
-    None where no metric needs them.
+    or (1, 3, n) are engine torque [N m], off-going and on-coming pressure [Pa] at the clutches,
+    followed by their commands in a closed loop; None where no metric needs them.
     """
 
     columns: FloatArray
@@ -298,7 +298,7 @@ def _compute_torque_reduction(runs: _Runs) -> FloatArray:
 
 def _compute_pressure_rate(runs: _Runs) -> FloatArray:
     assert runs.inputs is not None
-    steps = np.abs(np.diff(runs.inputs[:, 1:], axis=-1)).max(axis=(-1, -2))
+    steps = np.abs(np.diff(runs.inputs[:, 1:3], axis=-1)).max(axis=(-1, -2))
     return _extend(steps / runs.maneuver.step, runs)
 
 

@@ -45,6 +45,29 @@ class Limit:
         return np.asarray(np.maximum(values / self.bound - 1.0, 0.0))
 
 
+_SUFFIX = {
+    "m/s^3": "m_s3",
+    "m/s^1.75": "m_s175",
+    "N*m": "Nm",
+    "s": "s",
+    "J": "J",
+    "W": "W",
+    "rad/s": "rad_s",
+    "Pa/s": "Pa_s",
+}
+"""Units as keys of a file have them."""
+
+
+def build_limit_keys() -> dict[str, tuple[Metric, Statistic]]:
+    """Return the keys of `[limits]`: for 95 % of the draws, and with `mean_` for their mean."""
+    keys = {}
+    for metric, spec in METRICS.items():
+        name = f"{metric.value}_{_SUFFIX[spec.unit]}"
+        keys[name] = metric, Statistic.SHARE_95
+        keys[f"mean_{name}"] = metric, Statistic.MEAN
+    return keys
+
+
 def compute_tail_mean(values: FloatArray, share: float) -> float:
     """Mean of the largest part of `values` (n,) beyond the quantile `share` (CVaR).
 

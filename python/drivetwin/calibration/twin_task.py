@@ -73,7 +73,7 @@ def build_task(twin: Twin, request: Request) -> Task:
     shift = build_nominal_shift(twin, request.gears)
     oil = build_oil_state(twin, request)
     model = oil.warm(twin.build_dual_clutch(shift))
-    point = _choose_point(twin, request)
+    point = choose_point(twin, request)
     added, path = twin.build_added_elements(model), InputPath.from_twin(twin)
     radius = request.wheel_radius or twin.wheel_radius or USUAL_WHEEL_RADIUS
     maneuver = Maneuver(model, point, radius, path=path, added=added)
@@ -160,8 +160,8 @@ def derive_limits(task: Task) -> tuple[Limit, ...]:
     return tuple(limits)
 
 
-def _choose_point(twin: Twin, request: Request) -> OperatingPoint:
-    """Operating point: as requested, else the middle of what the log has."""
+def choose_point(twin: Twin, request: Request) -> OperatingPoint:
+    """Return the operating point: as requested, else the middle of the range of the log."""
     torque, speed = request.engine_torque, request.engine_speed
     missing = [
         name

@@ -30,6 +30,7 @@ from drivetwin.cli.schema import schema
 from drivetwin.cli.shifts import shifts
 from drivetwin.cli.simulate import simulate
 from drivetwin.cli.synth import synth
+from drivetwin.cli.try_controller import try_controller
 from drivetwin.cli.workbench import workbench
 from drivetwin.errors import INTERRUPTED, DrivetwinError, InputError, Where
 
@@ -44,6 +45,7 @@ COMMANDS: dict[str, Entry] = {
     "simulate": simulate,
     "observe": observe,
     "calibrate": calibrate,
+    "try": try_controller,
     "report": report,
     "export": export,
     "gearbox": gearbox,

@@ -5,11 +5,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -25,8 +23,8 @@ from drivetwin.cli.calibrate_logs import (
     to_correction_document,
 )
 from drivetwin.cli.output import print_blocks, print_json, print_line, show_step, to_error_document
+from drivetwin.cli.own_controller import compile_controller
 from drivetwin.errors import (
-    ControllerError,
     DrivetwinError,
     IdentificationError,
     InfeasibleError,
@@ -113,9 +111,10 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
         require_search()
     if request.controller is not None:
         request = replace(request, policy=PolicyKind.OWN)
-    model = _load_valid_twin(request.twin)
+    model = load_valid_twin(request.twin)
     output = request.output
-    with _build_controller(request.controller) as controller:
+    given = request.controller
+    with nullcontext() if given is None else compile_controller(given) as controller:
         task, correction = _build_request(request, model, controller)
         model = model if correction is None else correction.twin
         stages = _open_stages(request)
@@ -152,32 +151,6 @@ def _find_excess(found: Calibration, output: Path) -> DrivetwinError | None:
     except InfeasibleError as error:
         return replace(error, where=Where(file=str(output / CALIBRATION)))
     return None
-
-
-@contextmanager
-def _build_controller(path: Path | None) -> Iterator[UserController | None]:
-    """Compile the controller of a parameter file for the block; None without a file.
-
-    Errors of the controller name its source.
-    """
-    if path is None:
-        yield None
-        return
-    from drivetwin.calibration.policies import own
-    from drivetwin.export.compiler import compile_library, detect_platform
-    from drivetwin.files.controller_file import build_user_controller, load_controller_file
-
-    content = load_controller_file(path)
-    source = path.parent / content.source
-    with TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # Windows keeps loaded libraries
-        platform = detect_platform()
-        library = Path(folder) / f"{source.stem}{platform.suffix if platform else '.so'}"
-        with show_step(f"compiling {source.name}"):
-            compile_library([source.resolve()], library, None, headers=[own.HEADER.parent])
-        try:
-            yield build_user_controller(content, library)
-        except ControllerError as error:
-            raise replace(error, where=Where(file=str(source))) from None
 
 
 def _build_request(
@@ -230,8 +203,8 @@ def _open_stages(request: Calibrate) -> StagesFile:
     if request.controller is not None:
         from drivetwin.files.controller_file import load_controller_file
 
-        source = request.controller.parent / load_controller_file(request.controller).source
-        contents["controller source"] = compute_digest(source)
+        sources = load_controller_file(request.controller).list_sources(request.controller)
+        contents |= {f"source {one.name}": compute_digest(one) for one in sources}
     version = {"program version": get_program_version()}
     inputs = {**contents, **request.describe_settings(), **version}
     whole = request.output.resolve()
@@ -328,7 +301,7 @@ def _divide(first: float, last: float, count: int) -> tuple[float, ...]:
     return tuple(first + (last - first) * k / steps for k in range(count))
 
 
-def _load_valid_twin(source: Path) -> Twin:
+def load_valid_twin(source: Path) -> Twin:
     """Load a twin; raises IdentificationError where its result says that it is not valid."""
     from drivetwin.estimation.result.method import ModelStatus
     from drivetwin.files.result_file import load_result

@@ -24,6 +24,8 @@ _ZIG_TARGETS = {
     Platform.MACOS: "x86_64-macos",
     Platform.MACOS_ARM: "aarch64-macos",
 }
+_LONGEST = 4000
+"""Longest message of a compiler in an error [characters]: that of some ten faults."""
 
 
 def detect_platform() -> Platform | None:
@@ -44,10 +46,11 @@ def compile_library(
     platform: Platform | None,
     defines: Sequence[str] = (),
     headers: Sequence[Path] = (),
-) -> None:
-    """Compile C99 sources into the shared library `target`.
+    warnings: Sequence[str] = (),
+) -> str:
+    """Compile C99 sources into the shared library `target`; return the words of the compiler.
 
-    Headers stand beside the sources, or in the folders `headers`.
+    Headers stand beside the sources, or in the folders `headers`. `warnings` are its options.
 
     `platform` None builds for this machine by the compiler found (`cc`, `gcc`, `clang`), by zig
     without one. Raises CompilerError with the compiler's words, MissingExtraError without zig.
@@ -61,6 +64,7 @@ def compile_library(
         *_find_compiler(platform),
         *("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-shared"),
         *(["-s"] if windows else ["-fPIC"]),
+        *warnings,
         *(f"-D{name}" for name in defines),
         *(f"-I{include}" for include in includes),
         *(relpath(path, folder) for path in sources),
@@ -70,12 +74,13 @@ def compile_library(
     status, message = _run_compiler(command, folder)
     if status != 0:
         raise CompilerError(
-            f"{command[0]} cannot build {target.name}: {message.strip()[:500]}",
+            f"{command[0]} cannot build {target.name}: {message.strip()[:_LONGEST]}",
             "check the compiler with a small program, or install the extra: "
             'pip install "drivetwin[fmu]"',
         )
     if windows:
         _clear_times(target)
+    return message
 
 
 def _run_compiler(command: Sequence[str], folder: Path) -> tuple[int, str]:

@@ -15,11 +15,11 @@ from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitState
 from drivetwin.calibration.front import Arm, Front
 from drivetwin.calibration.metrics import METRICS, Metric
+from drivetwin.calibration.objective import build_limit_keys
 from drivetwin.calibration.operating_map import MapPoint, OperatingMap
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Policy
 from drivetwin.calibration.spread import Spread
-from drivetwin.files.limits_file import build_limit_keys
 from drivetwin.files.records import Record, SchemaName, read_record, write_toml
 
 

@@ -65,12 +65,25 @@ class ControllerParameter(Record):
 
 
 class ControllerFile(Record):
-    """File of a controller; `source` is relative to it."""
+    """File of a controller; `source`, one file or several, and `include` are relative to it.
 
-    source: str
+    `defines` are macros such as `"LIMIT=3"`, `warnings` options of the compiler such as `"-Wall"`.
+    """
+
+    source: str | Annotated[list[str], Field(min_length=1)]
+    include: list[str] = Field(default_factory=list)
+    defines: list[Annotated[str, Field(pattern=r"^[A-Za-z_]\w*(=.*)?$")]] = Field(
+        default_factory=list
+    )
+    warnings: list[Annotated[str, Field(pattern=r"^-W[a-z0-9=+-]+$")]] = Field(default_factory=list)
     task_s: Annotated[FiniteFloat, Field(ge=1e-3, le=0.1)] = 0.01
     oil_temperature_C: Annotated[FiniteFloat, Field(gt=-50, lt=200)] = 80.0
     parameters: Annotated[list[ControllerParameter], Field(min_length=1)]
+
+    def list_sources(self, path: Path) -> list[Path]:
+        """List the sources of the file at `path`."""
+        names = [self.source] if isinstance(self.source, str) else self.source
+        return [path.parent / name for name in names]
 
 
 def load_controller_file(path: Path) -> ControllerFile:
@@ -89,6 +102,8 @@ def load_controller_file(path: Path) -> ControllerFile:
         for k, name in enumerate(names)
         if name in names[:k]
     ]
+    missing = [one for one in content.list_sources(path) if not one.is_file()]
+    faults += [Fault("source", f"{one} is no file") for one in missing]
     raise_faults(faults, InputError, str(path), _REMEDY)
     return content
 

@@ -12,34 +12,11 @@ from pydantic import Field, FiniteFloat
 from scipy.constants import zero_Celsius
 
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
-from drivetwin.calibration.metrics import METRICS, Metric
-from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.objective import Limit, build_limit_keys
 from drivetwin.calibration.oil import FRICTION_SLOPE, FRICTION_SLOPE_STD, OilFriction
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.files.records import Record
-
-_SUFFIX = {
-    "m/s^3": "m_s3",
-    "m/s^1.75": "m_s175",
-    "N*m": "Nm",
-    "s": "s",
-    "J": "J",
-    "W": "W",
-    "rad/s": "rad_s",
-    "Pa/s": "Pa_s",
-}
-"""Units as keys of a file have them."""
-
-
-def build_limit_keys() -> dict[str, tuple[Metric, Statistic]]:
-    """Return the keys of `[limits]`: for 95 % of the draws, and with `mean_` for their mean."""
-    keys = {}
-    for metric, spec in METRICS.items():
-        name = f"{metric.value}_{_SUFFIX[spec.unit]}"
-        keys[name] = metric, Statistic.SHARE_95
-        keys[f"mean_{name}"] = metric, Statistic.MEAN
-    return keys
 
 
 class OilRecord(Record):

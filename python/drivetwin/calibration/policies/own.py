@@ -15,6 +15,10 @@ from drivetwin.simulation.shift_control import ControlledUnit, ExternalControlle
 
 HEADER = Path(__file__).with_name("drivetwin_controller.h")
 """Interface of the step function, for the compiler."""
+BENCH = Path(__file__).with_name("drivetwin_bench.c")
+"""Test bench around the step function, compiled with it."""
+BENCH_DEFINES = ("dt_step=dt_user_step", "dt_state_size=dt_user_state_size")
+"""Names that the bench gives to the functions of the controller."""
 
 
 @dataclass(frozen=True)

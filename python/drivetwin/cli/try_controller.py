@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""`drivetwin try TWIN --shift 2-3 --controller FILE`: test bench of the user's controller."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from drivetwin._util.request import REQUIRED, SECOND, input_file, option, output_folder
+from drivetwin.calibration.options import ShiftOptions
+from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.cli.arguments import REPORT, TwinInput
+from drivetwin.cli.output import print_blocks, print_json, show_step
+from drivetwin.cli.own_controller import compile_controller
+
+if TYPE_CHECKING:
+    from drivetwin.calibration.trial import Trial
+    from drivetwin.calibration.trial_comparison import Difference
+    from drivetwin.files.trial_file import TrialFile
+    from drivetwin.twin.twin import Twin
+
+JUNIT = "junit.xml"
+FAILED = 1
+"""Exit code where an assertion fails."""
+
+
+class Try(ShiftOptions, TwinInput, command="try"):
+    """Arguments of `try`."""
+
+    shift: str = option("Shift of the scenarios that state none, such as 2-3.",
+                        metavar="GEAR-GEAR", default=REQUIRED)  # fmt: skip
+    controller: Path = input_file("Parameter file of your controller in C.", default=REQUIRED)
+    against: Path | None = input_file("Parameter file of a second controller, on the same draws.")
+    scenarios: Path | None = input_file("Scenarios and assertions (TOML); else those in stock.")
+    draws: int = option("Drawn units of each scenario.", minimum=1, maximum=100_000, default=16)
+    task: float | None = option(
+        "Time between two commands, in place of that of the file.",
+        unit=SECOND,
+        minimum=1e-3,
+        maximum=0.1,
+    )
+    output: Path | None = output_folder("Folder for report.html and junit.xml.")
+
+
+def try_controller(request: Try, *, as_json: bool) -> None:
+    """Test a controller in C on drawn units of a twin, with faults and assertions.
+
+    Run the scenarios of a file, or those in stock: mass, gradient, oil, torque, pedal, weak
+    clutches, slow filling, late, stuck and lost signals. With --against, compare a second
+    controller on the same draws. Exit code 1 where an assertion of the controller fails.
+    """
+    from drivetwin.calibration.trial_comparison import compare_trials
+    from drivetwin.cli.calibrate import load_valid_twin
+    from drivetwin.files.trial_file import STOCK, load_trials
+    from drivetwin.report.trial import build_trial_blocks
+
+    twin, trials = load_valid_twin(request.twin), load_trials(request.scenarios or STOCK)
+    found = _run(twin, trials, request, request.controller)
+    differences: list[Difference] = []
+    if request.against is not None:
+        differences = compare_trials(found, _run(twin, trials, request, request.against))
+    if request.output is not None:
+        _write_results(request.output, found, differences, request.controller)
+    if as_json:
+        states = [
+            {
+                "scenario": one.scenario.name,
+                "error": one.error,
+                "checks": [asdict(check) for check in one.checks],
+            }
+            for one in found
+        ]
+        print_json({"scenarios": states, "differences": [asdict(one) for one in differences]})
+    else:
+        print_blocks(build_trial_blocks(found, differences))
+    if any(one.failed for one in found):
+        raise typer.Exit(FAILED)
+
+
+def _run(twin: Twin, trials: TrialFile, request: Try, path: Path) -> list[Trial]:
+    from drivetwin.calibration.trial import run_trials
+    from drivetwin.calibration.twin_task import Request
+    from drivetwin.cli.export import parse_gears
+
+    asked = Request(
+        **request.select(ShiftOptions),
+        gears=parse_gears(request.shift),
+        spread=trials.spread,
+        oil=trials.oil.to_friction(),
+        policy=PolicyKind.OWN,
+    )
+    scenarios = trials.list_scenarios(request.shift, request.draws)
+    with compile_controller(path, bench=True) as given, show_step(f"testing {path.name}"):
+        own = replace(given, task=request.task or given.task)
+        return run_trials(twin, asked, own, scenarios)
+
+
+def _write_results(
+    folder: Path, found: list[Trial], differences: list[Difference], path: Path
+) -> None:
+    from drivetwin._util.atomic import write_text
+    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.report.trial import format_junit, render_trials
+
+    with write_atomically(folder) as beside:
+        write_text(beside / JUNIT, format_junit(found, path.stem))
+        write_text(beside / REPORT, render_trials(found, differences, f"Test of {path.stem}"))
