@@ -47,7 +47,7 @@ def disturb(name: str, steps: FloatArray) -> dict[str, Signal]:
 def respond() -> tuple[NetworkResponse, LinearResponse]:
     found = compute_response(ELEMENTS, INPUTS, START, TIME, OUTPUTS, accuracy=EXACT)
     assert found is not None
-    return found, LinearResponse(np.diff(TIME), found.transition, found.drive)
+    return found, LinearResponse(found.transition, found.drive, {})
 
 
 @pytest.mark.parametrize("name", INPUTS)
@@ -122,7 +122,7 @@ def test_a_prescribed_speed_is_an_offset_of_the_state_and_of_what_is_locked_to_i
     inputs = {"w": Signal(TIME, speed), "P": pressure}
     found = compute_response(elements, inputs, start, TIME, outputs, accuracy=EXACT)
     assert found is not None
-    response = LinearResponse(np.diff(TIME), found.transition, found.drive)
+    response = LinearResponse(found.transition, found.drive, {})
     state = (
         response.propagate_inputs({"w": 0.5 * (noise[1:] + noise[:-1])})
         + found.offset["w"] * noise[:, None]

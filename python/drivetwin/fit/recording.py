@@ -190,10 +190,6 @@ class NetworkRecord(ComparedOutputs):
     fast: Mapping[str, FloatArray]
     windows: Mapping[str, NDArray[np.intp]]
 
-    def sample(self, columns: Mapping[str, FloatArray]) -> FloatArray:
-        """Sample quantities (N,) or (N, p) on the grid, by name; (size,) or (size, p)."""
-        return np.concatenate([out.sample(self.time, columns[out.name]) for out in self.outputs])
-
     def coarsen(self, count: int) -> NetworkRecord:
         """Keep about `count` points of the grid: every k-th sample of each output, and means of
         the inputs over as many of theirs."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -19,6 +19,7 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
     Whitener,
     add_input_noise,
     build_sensor_whitener,
+    compute_quiet_noise,
 )
 from drivetwin.estimation.likelihood.objective import OBJECTIVE, LikelihoodObjective
 from drivetwin.estimation.optimize.objective import ParameterVector
@@ -29,9 +30,6 @@ from drivetwin.fit.recording import NetworkRecord
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import NetworkRun, simulate
 from drivetwin.simulation.network_response import NetworkResponse, compute_response
-
-_PROBES = 8
-"""Instants at which a state is disturbed to see which outputs show it [count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,14 +164,12 @@ class NetworkTerm:
             return None
         record, step = self.record, np.diff(self.record.time)
         drive = {name: found.drive[name] for name in record.inputs if name in found.drive}
-        response = LinearResponse(step, found.transition, drive)
+        rows = {name: found.rows[output] for name, output in self.plant.outputs.items()}
+        response = LinearResponse(found.transition, drive, rows)
         if not response.finite:
             return None
         shown = self.plant.build_channels(point)
-        rows = {
-            name: shown[name].gain * found.rows[output]
-            for name, output in self.plant.outputs.items()
-        }
+        rows = {name: shown[name].gain * row for name, row in rows.items()}
         delays = self.plant.get_delays(point, record.inputs)
         power = record.compute_power(drive, delays)
         direct = {  # derivatives (N,) by prescribed speeds
@@ -192,7 +188,7 @@ class NetworkTerm:
         ]
         quiet = self.quiet
         if quiet is None:
-            quiet = _compute_quiet_noise(response, seen)
+            quiet = compute_quiet_noise(response, seen)
         try:
             sigma = np.concatenate([one.sigma for one in seen])
             weighting = add_input_noise(sigma, response, InputNoise(seen, power, quiet))
@@ -239,24 +235,3 @@ def _add_direct_noise(
         of_input = np.append(of_input, of_input[-1:])
         variance += (slope**2 * of_input)[out.centre]
     return np.asarray(np.sqrt(variance))
-
-
-def _compute_quiet_noise(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:
-    """Compute the change (S,) of each state that an output shows by the noise of its sensor.
-
-    Some time later, as a twist shows in no speed at once. A state that no output ever shows has no
-    unit to compare with: its change counts as 1.
-    """
-    steps, states = len(response.transition), response.states
-    places = np.unique(np.linspace(0, steps - 1, _PROBES).astype(int))
-    push = np.zeros((steps, states, places.size * states))
-    for k, place in enumerate(places):
-        push[place, :, k * states : (k + 1) * states] = np.eye(states)
-    z = response.propagate_columns(push)
-    shown = np.zeros((places.size, states))
-    for out in outputs:
-        effect = np.einsum("...s,...sq->...q", out.get_rows(), z[out.centre])
-        largest = np.max(np.abs(effect), axis=0) / np.min(out.sigma)
-        shown = np.maximum(shown, largest.reshape(places.size, states))
-    usual = np.median(shown, axis=0)
-    return np.where(usual > 0.0, 1.0 / np.where(usual > 0.0, usual, 1.0), 1.0)

@@ -19,11 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.estimation.likelihood.noise.shift_response import (
-    build_output_row,
-    build_slip_row,
-    compute_exponentials,
-)
 from drivetwin.observer.result import FloatArray
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement
 
@@ -96,9 +91,9 @@ def build_linear_model(model: DualClutch, course: Course) -> Linear:
     rate[:, TORQUE_ERROR, TORQUE_ERROR] = -course.error_rate
     push = np.zeros((step.size, STATES))
     push[:, :SPEEDS] = np.einsum("kij,kj->ki", moving, known)
-    transition, mean = compute_exponentials(rate * step[:, None, None])
+    transition, mean = _compute_exponentials(rate * step[:, None, None])
     shaft = np.zeros(STATES)
-    shaft[:4] = build_output_row(model, "output_torque")
+    shaft[:4] = _build_shaft_row(model)
     rows = {"output_torque": np.broadcast_to(shaft, (step.size, STATES))}
     constants = {"output_torque": np.zeros(step.size)}
     for place, one in enumerate(model.elements):
@@ -111,9 +106,14 @@ def build_linear_model(model: DualClutch, course: Course) -> Linear:
     return Linear(transition, pushed, rows, constants, drift)
 
 
+def _build_shaft_row(model: DualClutch) -> FloatArray:
+    """Torque of the output shaft as a row (4,) of speeds and twist."""
+    return np.array([0.0, model.c_o, -model.c_o * model.i_f, model.k_o])
+
+
 def _build_slip_row(model: DualClutch, one: ShiftElement) -> FloatArray:
-    """Slip of an element as a row of the three speeds."""
-    return build_slip_row(model, one)[:SPEEDS]
+    """Slip of an element, ω_in/i_c - i_out·ω_out (eq. 15), as a row (3,) of the speeds."""
+    return np.array([1.0 / (model.i_in * one.i_c), -one.i_out, 0.0])
 
 
 def _compute_efficiency(model: DualClutch, course: Course) -> FloatArray:
@@ -128,7 +128,7 @@ def _compute_forces(model: DualClutch, course: Course) -> tuple[FloatArray, Floa
     share = _compute_efficiency(model, course)
     force = np.zeros((count, SPEEDS, STATES))
     known = np.zeros((count, SPEEDS))
-    shaft = build_output_row(model, "output_torque")
+    shaft = _build_shaft_row(model)
     force[:, OUTPUT, :4] -= shaft
     force[:, WHEEL, :4] += model.i_f * shaft
     force[:, WHEEL, LOAD] = -1.0
@@ -164,3 +164,44 @@ def _compute_locking_rows(
         along = inverse @ g
         found[one.name] = course.locked[one.name][:, None] * along / (along @ g)[:, None]
     return found
+
+
+_LEAST_DOUBLINGS = 3
+"""Doublings after a Taylor series of fourth order [count]."""
+_SAME = 1e-10
+"""Difference of successive rates over their size that is rounding of the stamps."""
+
+
+def _compute_exponentials(matrices: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Compute e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
+
+    Successive equal matrices share one computation: with all elements locked the rate is constant
+    and its steps differ by the rounding of the stamps.
+    """
+    flat = np.abs(matrices.reshape(len(matrices), -1))
+    changes = np.abs(np.diff(matrices.reshape(flat.shape), axis=0)).max(axis=1)
+    # Written so that a number that is not finite begins a new run.
+    starts = np.r_[True, ~(changes <= _SAME * flat[1:].max(axis=1))]
+    size = float(np.abs(matrices[starts]).sum(axis=2).max())
+    doublings = int(np.ceil(np.log2(max(size, 1.0)))) + 1 if np.isfinite(size) else 0
+    found, mean = _compute_exponential(matrices[starts], max(doublings, _LEAST_DOUBLINGS))
+    run = np.cumsum(starts) - 1
+    return found[run], mean[run]
+
+
+def _compute_exponential(matrix: FloatArray, doublings: int) -> tuple[FloatArray, FloatArray]:
+    """Compute e^M and its mean over the step, ∫₀¹ e^(M·s) ds, of (n, m, m).
+
+    Taylor's series of M over 2^`doublings`, doubled so many times.
+    """
+    term = matrix / 2.0**doublings
+    identity = np.eye(matrix.shape[-1])
+    result, mean, power = identity + term, identity + term / 2.0, term
+    for order in (2, 3, 4):
+        power = power @ term / order
+        result = result + power
+        mean = mean + power / (order + 1.0)
+    for _ in range(doublings):
+        mean = 0.5 * (result + identity) @ mean
+        result = result @ result
+    return np.asarray(result), np.asarray(mean)

@@ -40,7 +40,6 @@ from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.noise.residual_covariance import NoisePath
-from drivetwin.estimation.likelihood.noise.shift_response import STATES, build_output_row
 from drivetwin.estimation.likelihood.selection.candidates import check_other_law, collect_loads
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
@@ -116,27 +115,24 @@ def predict_spread(
         spread = propagate_variance(rows[:, acting], joint[np.ix_(acting, acting)])
         variance = term.record.sigma**2 + spread
         if term.weighting.path is not None:
-            variance += _propagate_inputs(term, fit.point, term.weighting.path)
+            variance += _propagate_inputs(term.weighting.path)
         found.append(_split(term, mean, np.sqrt(variance)))
     return tuple(found)
 
 
-def _propagate_inputs(term: ShiftTerm, point: ParameterVector, path: NoisePath) -> FloatArray:
+def _propagate_inputs(path: NoisePath) -> FloatArray:
     """Compute the variance (n,) of the compared samples by the noise of the inputs."""
     response = path.response
     push = sum(
         path.power[name][:, None, None] * drive[:, :, None] * drive[:, None, :]
         for name, drive in response.drive.items()
     )
-    state = np.zeros((term.record.time.size, STATES, STATES))
+    state = np.zeros((len(path.inverse), response.states, response.states))
     for k, (step, change) in enumerate(zip(response.transition, np.asarray(push), strict=True)):
         state[k + 1] = step @ state[k] @ step.T + change
-    model = term.structure.build_model(point)
-    found = []
-    for out in term.record.outputs:
-        row = build_output_row(model, out.name)
-        found.append(np.einsum("i,kij,j->k", row, state[out.centre], row))
-    return np.concatenate(found)
+    rows = path.seen.data.reshape(-1, response.states)
+    centre = path.seen.indices[:: response.states] // response.states
+    return np.asarray(np.einsum("ni,nij,nj->n", rows, state[centre], rows))
 
 
 def _split(term: ShiftTerm, mean: FloatArray, std: FloatArray) -> dict[str, PredictedSpread]:

@@ -14,16 +14,13 @@ from drivetwin.estimation.likelihood.data.sample_noise import spread_over_steps
 from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.noise.residual_covariance import (
     InputNoise,
+    LinearResponse,
     SeenOutput,
     SharedNoise,
     Whitener,
     add_input_noise,
     build_sensor_whitener,
-)
-from drivetwin.estimation.likelihood.noise.shift_response import (
-    ShiftResponse,
-    build_output_row,
-    linearise_run,
+    compute_quiet_noise,
 )
 from drivetwin.estimation.likelihood.objective import OBJECTIVE, LikelihoodObjective
 from drivetwin.estimation.likelihood.parametrization import (
@@ -39,30 +36,12 @@ from drivetwin.estimation.optimize.objective import (
     place_columns,
 )
 from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.simulation.driveline_run import DrivelineTask
-from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
+from drivetwin.simulation.driveline_run import COMPARED, DrivelineTask
+from drivetwin.simulation.dual_clutch import Signal, Trajectory
 from drivetwin.vehicle.spec import PriorValue
 
 
-def weight_by_inputs(model: DualClutch, record: ShiftRecord, response: ShiftResponse) -> Whitener:
-    """Build the weighting of a shift that includes the noise of engine torque and pressures.
-
-    Raises LinAlgError where the response has lost its digits.
-    """
-    share, shared = record.compute_torque_share(), None
-    if share is not None:
-        response = response.apply_torque_feedback(np.asarray(share.sum(axis=1)))
-        shared = SharedNoise(TORQUE, share)
-    outputs = [
-        SeenOutput(build_output_row(model, out.name), out.centre, out.sigma)
-        for out in record.outputs
-    ]
-    power = _compute_power(record, response)
-    noise = InputNoise(outputs, power, _compute_sensor_noise(model, record), shared)
-    return add_input_noise(record.sigma, response, noise)
-
-
-def _compute_power(record: ShiftRecord, response: ShiftResponse) -> dict[str, FloatArray]:
+def _compute_power(record: ShiftRecord, response: LinearResponse) -> dict[str, FloatArray]:
     """Compute the variance (N-1,) of an input's noise, constant over each step, by name."""
     stamps = {name: one.time for name, one in record.pressures.items()}
     stamps[TORQUE] = record.engine_torque.time
@@ -70,19 +49,6 @@ def _compute_power(record: ShiftRecord, response: ShiftResponse) -> dict[str, Fl
         name: spread_over_steps(record.time, stamps[name], record.compute_variance(name))
         for name in response.drive
     }
-
-
-def _compute_sensor_noise(model: DualClutch, record: ShiftRecord) -> FloatArray:
-    """Compute the noise (4,) of a sensor of each state.
-
-    Where the log has no output torque, its noise counts as that which the shaft turns the noise of
-    the output speed into.
-    """
-    sigma = {out.name: out.sigma for out in record.outputs}
-    wheel = sigma.get("wheel_speed", sigma["output_speed"] / model.i_f)
-    impedance = float(np.sqrt(model.k_o * model.J_out))
-    torque = sigma.get("output_torque", impedance * sigma["output_speed"])
-    return np.array([sigma["engine_speed"], sigma["output_speed"], wheel, torque / model.k_o])
 
 
 OWN_REACH = 3.0
@@ -95,13 +61,15 @@ class ShiftTerm:
     """One shift: its structure, what was recorded, and the weighting of its residuals.
 
     `record` has the inputs that drive the run; `returned` (n,) is G·(u - û), what those held back
-    would do, 0 before the term is weighted by input noise.
+    would do, 0 before the term is weighted by input noise. `quiet` (S,) are units of the states,
+    kept from the first of these weightings.
     """
 
     structure: ShiftModel
     record: ShiftRecord
     weighting: Whitener
     returned: FloatArray | float = 0.0
+    quiet: FloatArray | None = None
 
     @classmethod
     def from_sensor_noise(cls, structure: ShiftModel, record: ShiftRecord) -> ShiftTerm:
@@ -143,19 +111,18 @@ class ShiftTerm:
 
         Raises InputError or SimulationError for an impossible description.
         """
-        return self._build_task(point, self.get_acting_torque(point), time).simulate()
+        return replace(self.build_task(point), time=time).simulate()
 
-    def _build_task(
-        self, point: ParameterVector, torque: Signal, time: FloatArray
-    ) -> DrivelineTask:
+    def build_task(self, point: ParameterVector) -> DrivelineTask:
+        """Build the run at `point`, driven by its inputs as they act there."""
         model = self.structure.build_model(point)
         return DrivelineTask(
             model,
             self.structure.build_added_elements(point, model),
-            torque,
+            self.get_acting_torque(point),
             self.get_pressures(),
             self.structure.build_start(point),
-            time,
+            self.record.time,
         )
 
     def drop_plant_effect(self) -> ShiftTerm:
@@ -175,8 +142,7 @@ class ShiftTerm:
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
         `point`."""
-        torque = self.get_acting_torque(point)
-        variables = self._build_task(point.to_variables(), torque, self.record.time)
+        variables = self.build_task(point.to_variables())
         changes = self._compute_torque_changes(point)
         try:
             run, derivatives = variables.differentiate(len(point.names))
@@ -185,9 +151,9 @@ class ShiftTerm:
         if not self._is_complete(run):
             return None
         slopes = self.record.sample_derivatives(derivatives)
-        response = self.compute_response(point, run)
+        response = self.compute_response(point) if changes else None
         for name, disturbance in changes.items():
-            answer = self.observe(point, response.propagate_inputs({TORQUE: disturbance}))
+            answer = self.observe(response, {TORQUE: disturbance})
             slopes[:, point.names.index(name)] = answer
         if not np.all(np.isfinite(slopes)):
             return None
@@ -207,24 +173,31 @@ class ShiftTerm:
             found[offset] = np.full(self.record.time.size - 1, -1.0)
         return found
 
-    def compute_response(self, point: ParameterVector, run: Trajectory) -> ShiftResponse:
-        """Compute the linear response to disturbances of the inputs around `run`."""
-        return linearise_run(self.structure.build_model(point), run, self.record)
+    def compute_response(
+        self, point: ParameterVector, nodes: Sequence[str] = ()
+    ) -> LinearResponse | None:
+        """Compute the linear response of the outputs at `point` to disturbances of the inputs, and
+        to torques on `nodes`; None if the run fails or has no finite response."""
+        try:
+            found = self.build_task(point).respond(nodes)
+        except InputError:
+            return None
+        if found is None:
+            return None
+        names = (TORQUE, *self.record.pressures, *nodes)
+        drive = {name: found.drive[name] for name in names}
+        rows = {name: found.rows[output] for name, output in COMPARED.items()}
+        response = LinearResponse(found.transition, drive, rows)
+        return response if response.finite else None
 
-    def respond_to_inputs(
-        self, point: ParameterVector, run: Trajectory, disturbance: dict[str, FloatArray]
+    def observe(
+        self, response: LinearResponse | None, disturbance: Mapping[str, FloatArray]
     ) -> FloatArray:
         """Compute the change (n,) of the simulated samples by disturbances (N-1,) of inputs, by
-        name."""
-        return self.observe(point, self.compute_response(point, run).propagate_inputs(disturbance))
-
-    def observe(self, point: ParameterVector, z: FloatArray) -> FloatArray:
-        """Project disturbances z (N, 4) of the state onto the compared samples (n,)."""
-        model = self.structure.build_model(point)
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.concatenate(
-                [z[out.centre] @ build_output_row(model, out.name) for out in self.record.outputs]
-            )
+        name; NaN without a response."""
+        if response is None:
+            return np.full(self.record.size, np.nan)
+        return self.record.sample(response.show(response.propagate_inputs(disturbance)))
 
     def update_weighting(self, point: ParameterVector) -> ShiftTerm:
         """Compute the covariance of output and input noise at `point`.
@@ -253,20 +226,25 @@ class ShiftTerm:
 
     def _update_weighting(self, point: ParameterVector) -> ShiftTerm | None:
         """Compute weighting and the effect of the held-back inputs at `point`; None if no run."""
-        run = self.simulate(point)
-        if run is None:
+        response = self.compute_response(point)
+        if response is None:
             return None
-        model = self.structure.build_model(point)
-        response = linearise_run(model, run, self.record)
-        if not response.finite:
-            return None
+        record, rows = self.record, response.rows
+        seen = [SeenOutput(rows[out.name], out.centre, out.sigma) for out in record.outputs]
+        quiet = compute_quiet_noise(response, seen) if self.quiet is None else self.quiet
+        held_back = record.interpolate_held_back(self.structure.get_value(point, "te_delay"))
+        returned = self.observe(response, held_back)
+        share, shared = record.compute_torque_share(), None
+        if share is not None:
+            slope = np.asarray(share.sum(axis=1), dtype=np.float64)
+            response = response.add_feedback(TORQUE, slope, rows["engine_speed"])
+            shared = SharedNoise(TORQUE, share)
+        noise = InputNoise(seen, _compute_power(record, response), quiet, shared)
         try:
-            weighting = weight_by_inputs(model, self.record, response)
+            weighting = add_input_noise(record.sigma, response, noise)
         except np.linalg.LinAlgError:
             return None
-        held_back = self.record.interpolate_held_back(self.structure.get_value(point, "te_delay"))
-        returned = self.observe(point, response.propagate_inputs(held_back))
-        return replace(self, weighting=weighting, returned=returned)
+        return replace(self, weighting=weighting, returned=returned, quiet=quiet)
 
     def add_to_inputs(self, point: ParameterVector, changes: Mapping[str, Signal]) -> ShiftTerm:
         """Return the term driven by inputs with `changes` by name, at the instants at which they
@@ -297,8 +275,8 @@ class ShiftTerm:
         values = signal.values
         offset = self.structure.get_unknown(TE_OFFSET)
         if offset in point.names:
-            values = values - point[offset]
-        delay = self.structure.get_value(point, "te_delay")
+            values = values - float(point[offset])
+        delay = float(self.structure.get_value(point, "te_delay"))
         return Signal(signal.time, values, -delay)
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.noise.shift_response import build_slip_row
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import Trajectory
@@ -22,8 +21,8 @@ class Contact:
     """One element in one term, over the steps (N-1,) of a run with their `middle` [s].
 
     `slip` [rad/s], pressure `above` P0 [Pa], `friction` of its law, and the torque `per_mu` [N m]
-    that friction of 1 makes, with the sign of slip, 0 where the element is locked. `row` (4,) is
-    its slip as a row of the state. Of an element that the term does not have all are 0.
+    that friction of 1 makes, with the sign of slip, 0 where the element is locked. Of an element
+    that the term does not have all are 0.
     """
 
     middle: FloatArray
@@ -31,7 +30,6 @@ class Contact:
     above: FloatArray
     friction: FloatArray
     per_mu: FloatArray
-    row: FloatArray
 
 
 def evaluate_contact(
@@ -43,16 +41,14 @@ def evaluate_contact(
     one = next((e for e in model.elements if e.name == name), None)
     if one is None or name not in term.record.pressures:
         nothing = np.zeros(middle.size)
-        return Contact(middle, nothing, nothing, nothing, nothing, np.zeros(4))
+        return Contact(middle, nothing, nothing, nothing, nothing)
     slips = run.slip[name]
     slip = 0.5 * (slips[1:] + slips[:-1])
     signal = term.record.pressures[name]
     above = np.maximum(np.interp(middle, signal.time, signal.values) - one.P0, 0.0)
     slipping = np.minimum(np.abs(slips[1:]), np.abs(slips[:-1])) > SLIPPING
     per_mu = np.where(slipping, np.sign(slip) * one.gain * above, 0.0)
-    return Contact(
-        middle, slip, above, one.friction.evaluate(slip), per_mu, build_slip_row(model, one)
-    )
+    return Contact(middle, slip, above, one.friction.evaluate(slip), per_mu)
 
 
 def find_loaded_slips(term: ShiftTerm, point: ParameterVector, name: str) -> FloatArray:

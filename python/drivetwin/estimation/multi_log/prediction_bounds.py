@@ -211,16 +211,15 @@ def _compute_bounds(
 ) -> dict[str, PredictionInterval]:
     """Compute the error of each output over draws; empty if the shift cannot be simulated."""
     term = term.update_weighting(point)
-    linear, run, path = term.linearise(point), term.simulate(point), term.weighting.path
-    if linear is None or run is None or path is None:
+    linear, path = term.linearise(point), term.weighting.path
+    if linear is None or path is None:
         return {}
-    columns, response = linear[1] @ moved, term.compute_response(point, run)
+    columns, response = linear[1] @ moved, term.compute_response(point)
     rms: dict[str, list[float]] = {out.name: [] for out in term.record.outputs}
     for _ in range(PREDICTION.draws):
         noise = {name: np.sqrt(p) * rng.standard_normal(p.size) for name, p in path.power.items()}
-        error = term.observe(
-            point, response.propagate_inputs(noise)
-        ) + columns @ rng.standard_normal(columns.shape[1])
+        error = term.observe(response, noise)
+        error = error + columns @ rng.standard_normal(columns.shape[1])
         error = error + term.record.sigma * rng.standard_normal(error.size)
         first = 0
         for out in term.record.outputs:

@@ -139,13 +139,11 @@ def _integrate(
 
 
 def test_a_column_is_the_motion_of_the_locked_driveline(quiet: Any) -> None:
-    """Before the torque phase from rest, after lock-up from the state that the response has: the
-    events are on the grid."""
+    """Before the torque phase from rest, after lock-up from the state that the response has."""
     at = quiet
     (drag,) = EFFECTS[EffectId.BRAKE_DRAG].build(at, STD)
     shift = bench(noise=0.0).signals.shift
-    assert drag.force is not None
-    state = at.response.propagate(np.einsum("kij,kj->ki", at.response.effect, drag.force))
+    state = at.response.propagate_inputs(drag.torques)
     signals = split(at, observe(at, [drag])[:, 0])
     locked = int(np.searchsorted(at.run.time, shift.lockup_time + MARGIN))
     spans = (

@@ -24,11 +24,11 @@ def _short() -> tuple[Any, Any]:
 
 def test_weighting_equals_the_dense_covariance() -> None:
     term, point = _short()
-    record, response = term.record, term.compute_response(point, term.simulate(point))
+    record, response = term.record, term.compute_response(point)
     whiteness = term.update_weighting(point).weighting
     G = np.column_stack(
         [
-            term.observe(point, response.propagate_inputs({name: impulse}))
+            term.observe(response, {name: impulse})
             for name, power in whiteness.path.power.items()
             for impulse in np.diag(np.sqrt(power))
         ]
@@ -70,12 +70,11 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     term, point = _short()
     term = _select_speeds(term, slope=-400.0, rest=2.0)
     record, whiteness = term.record, term.update_weighting(point).weighting
-    response = term.compute_response(point, term.simulate(point))
+    response = term.compute_response(point)
     effect = {}
     for name in response.drive:
         steps = np.eye(record.time.size - 1)
-        answers = [response.propagate_inputs({name: step}) for step in steps]
-        effect[name] = np.column_stack([term.observe(point, z) for z in answers])
+        effect[name] = np.column_stack([term.observe(response, {name: step}) for step in steps])
     share, power = _torque_by_speed(term), whiteness.path.power
     assert power[TORQUE][[0, -1]] == pytest.approx(np.array([1.0, 9.0]), rel=0.1)
     own = np.eye(record.size) - effect[TORQUE] @ share
@@ -121,12 +120,11 @@ def _sparse(every: int) -> tuple[Any, Any]:
     return term.from_sensor_noise(term.structure, sparse).update_weighting(start), start
 
 
-def _filtered(term: Any, point: Any, columns: FloatArray) -> FloatArray:
+def _filtered(term: Any, columns: FloatArray) -> FloatArray:
     """Products (q, q) of columns (n, q) weighted by a Kalman filter, sample after sample."""
     path, record = term.weighting.path, term.record
     response = path.response
-    ones = np.ones((record.time.size, 1))
-    rows = np.column_stack([term.observe(point, ones * state) for state in np.eye(4)])
+    rows = record.sample(response.rows)
     quiet = np.diag(1.0 / np.diag(path.inverse[0]))
     spread, state = quiet.copy(), np.zeros((len(quiet), columns.shape[1]))
     products = np.zeros((columns.shape[1], columns.shape[1]))
@@ -159,7 +157,7 @@ def test_slow_samples_weigh_as_a_kalman_filter_weighs_them(every: int) -> None:
     found = term.linearise(point)
     assert found is not None
     slopes = found[1] / np.linalg.norm(found[1], axis=0)
-    expected = np.diag(_filtered(term, point, slopes))
+    expected = np.diag(_filtered(term, slopes))
     weighed = np.einsum("ni,ni->i", slopes, term.weighting.apply_inverse(slopes))
     assert np.allclose(weighed, expected, rtol=1e-2, atol=0.0)
 

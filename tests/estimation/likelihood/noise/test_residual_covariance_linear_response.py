@@ -41,7 +41,7 @@ def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     assert run is not None
     middle = 0.5 * (base.time[1:] + base.time[:-1])
     change = np.interp(middle, new.time, new.values - old.values)
-    expected = term.respond_to_inputs(point, base, {name: change})
+    expected = term.observe(term.compute_response(point), {name: change})
     found = term.record.sample_run(run) - term.record.sample_run(base)
     near_lock = np.abs(
         np.concatenate([base.time[out.place] for out in term.record.outputs]) - shift.lockup_time
@@ -78,7 +78,7 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: Any) ->
         run = replace(term, record=moved).simulate(point)
         assert run is not None
         change = np.interp(middle + age, old.time, bump)
-        expected = term.respond_to_inputs(point, base, {"engine torque": change})
+        expected = term.observe(term.compute_response(point), {"engine torque": change})
         found = term.record.sample_run(run) - term.record.sample_run(base)
         weight = clear / term.record.sigma
         miss = np.linalg.norm((found - expected) * weight) / np.linalg.norm(found * weight)
@@ -97,7 +97,7 @@ def test_no_slip_is_left_over_wherever_in_a_step_the_element_locks(level: float)
     model = term.structure.build_model(point)
     element = next(one for one in model.elements if one.name == "B3")
     disturbance = {"engine torque": np.ones(run.time.size - 1)}
-    z = term.compute_response(point, run).propagate_inputs(disturbance)
+    z = term.compute_response(point).propagate_inputs(disturbance)
     slip = z[:, 0] / element.i_c - element.i_out * z[:, 1]
     assert np.max(np.abs(slip)) > 1e-2
     assert np.max(np.abs(slip[run.time > lock])) < 1e-12

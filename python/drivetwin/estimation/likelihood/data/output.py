@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -110,9 +111,14 @@ class Output:
 
 
 class ComparedOutputs:
-    """Samples of the outputs of a record, stacked in their order."""
+    """Samples of the outputs of a record on the grid `time` (N,) [s], stacked in their order."""
 
+    time: FloatArray
     outputs: tuple[Output, ...]
+
+    def sample(self, columns: Mapping[str, FloatArray]) -> FloatArray:
+        """Sample quantities (N,) or (N, p) on the grid, by name; (size,) or (size, p)."""
+        return np.concatenate([out.sample(self.time, columns[out.name]) for out in self.outputs])
 
     @property
     def size(self) -> int:

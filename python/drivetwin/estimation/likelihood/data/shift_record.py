@@ -96,14 +96,11 @@ class ShiftRecord(ComparedOutputs):
 
     def sample_run(self, run: Trajectory) -> FloatArray:
         """Sample a trajectory at the measured stamps; shape (size,)."""
-        columns = get_columns(run)
-        return np.concatenate([out.sample(run.time, columns[out.name]) for out in self.outputs])
+        return self.sample(get_columns(run))
 
     def sample_derivatives(self, derivatives: Mapping[network.Output, FloatArray]) -> FloatArray:
         """Sample derivatives (N, p) of a trajectory at the measured stamps; (size, p)."""
-        columns = [derivatives[COMPARED[out.name]] for out in self.outputs]
-        pairs = zip(self.outputs, columns, strict=True)
-        return np.concatenate([out.sample(self.time, column) for out, column in pairs])
+        return self.sample({name: derivatives[COMPARED[name]] for name in OUTPUTS})
 
     def sample_stamps(self, run: Trajectory) -> FloatArray:
         """Return a trajectory at the measured stamps whatever the samples are; shape (size,)."""

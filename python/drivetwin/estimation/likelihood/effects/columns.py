@@ -21,7 +21,6 @@ from drivetwin.estimation.likelihood.effects.effect import (
     evaluate_operating_point,
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.estimation.likelihood.noise.shift_response import STATES, build_output_row
 from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.optimize.objective import (
     ParameterVector,
@@ -443,21 +442,12 @@ def observe(at: OperatingPoint, disturbances: Sequence[Disturbance]) -> FloatArr
     response, count = at.response, len(disturbances)
     if count == 0:
         return np.zeros((at.record.size, 0))
-    push = np.zeros((at.middle.size, STATES, count))
+    push = np.zeros((at.middle.size, response.states, count))
     for k, one in enumerate(disturbances):
-        if one.force is not None:
-            push[:, :, k] += np.einsum("kij,kj->ki", response.effect, one.force)
-        for name, values in one.inputs.items():
+        for name, values in {**one.inputs, **one.torques}.items():
             push[:, :, k] += response.drive[name] * values[:, None]
-    state = response.propagate_columns(push)
+    shown = response.show(response.propagate_columns(push))
     for k, one in enumerate(disturbances):
-        if one.respond is not None:
-            state[:, :, k] += one.respond()
-    time, found = at.record.time, []
-    for out in at.record.outputs:
-        seen = np.einsum("i,kiq->kq", build_output_row(at.model, out.name), state[at.rows])
-        for k, one in enumerate(disturbances):
-            if out.name in one.outputs:
-                seen[:, k] += one.outputs[out.name][at.rows]
-        found.append(np.column_stack([out.sample(time, column) for column in seen.T]))
-    return np.concatenate(found)
+        for name, values in one.outputs.items():
+            shown[name][:, k] += values
+    return at.record.sample(shown)

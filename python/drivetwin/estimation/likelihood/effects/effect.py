@@ -10,41 +10,44 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.output import IndexArray
-from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord
+from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord, get_columns
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
-from drivetwin.estimation.likelihood.noise.shift_response import ShiftResponse, linearise_run
+from drivetwin.estimation.likelihood.noise.residual_covariance import LinearResponse
 from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.simulation.added_elements import AddedElements
+from drivetwin.simulation.driveline import INPUT, OUTPUT, WHEEL
+from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 from drivetwin.vehicle.effects import EffectId
 
-MIN_SPACING_S = 1e-6
-"""Distance [s] from a grid point within which an event gets no point of its own."""
+NODES = (INPUT, OUTPUT, WHEEL)
+"""Nodes on which effects act as torques."""
 
 
 @dataclass(frozen=True, eq=False)
 class OperatingPoint:
-    """One shift simulated at a point of the unknowns, on a grid that holds the run's own events.
-
-    A lock between two samples acts in a linear response at the end of its step; with the events
-    on the grid it acts in time. `rows` are the points of the record's grid among those of the run.
-    """
+    """One shift simulated at a point of the unknowns, with its response to the inputs and to
+    torques on `NODES`."""
 
     term: ShiftTerm
     point: ParameterVector
-    model: DualClutch
+    task: DrivelineTask
     run: Trajectory
-    response: ShiftResponse
-    rows: IndexArray
+    response: LinearResponse
+
+    @property
+    def model(self) -> DualClutch:
+        """Dual clutch of the run."""
+        return self.task.model
 
     @property
     def record(self) -> ShiftRecord:
@@ -111,12 +114,12 @@ class OperatingPoint:
         """Evaluate slip, pressure and friction of an element over each step."""
         return evaluate_contact(self.term, self.point, self.run, element)
 
-    def build_force(self, speed: int, torque: FloatArray) -> FloatArray:
-        """Build forces (N-1, 4) of a torque (N-1,) [N m] on one of the speeds: 0 engine, 1
-        output, 2 wheel."""
-        force = np.zeros((self.middle.size, 4))
-        force[:, speed] = torque
-        return force
+    def compute_change(self, added: AddedElements) -> dict[str, FloatArray]:
+        """Compute the changes (N,) of the compared signals by name where elements take the place of
+        those beside the dual clutch; NaN where the run fails."""
+        before = get_columns(self.run)
+        after = get_columns(replace(self.task, added=added).simulate())
+        return {name: after[name] - before[name] for name in before}
 
 
 def compute_middle(column: FloatArray) -> FloatArray:
@@ -126,19 +129,10 @@ def compute_middle(column: FloatArray) -> FloatArray:
 
 def evaluate_operating_point(term: ShiftTerm, point: ParameterVector) -> OperatingPoint | None:
     """Simulate a shift at `point` and linearise it; None if it has no complete, finite run."""
-    run = term.simulate(point)
-    if run is None:
+    run, response = term.simulate(point), term.compute_response(point, NODES)
+    if run is None or response is None:
         return None
-    grid, model = term.record.time, term.structure.build_model(point)
-    events = np.array([one.time for one in run.events if grid[0] < one.time < grid[-1]])
-    if events.size:
-        beside = np.min(np.abs(grid[:, None] - events), axis=0) > MIN_SPACING_S
-        time = np.unique(np.concatenate([grid, events[beside]]))
-        run = term.simulate_on(point, time)
-    response = linearise_run(model, run, term.record)
-    if run.status != "completed" or not response.finite:
-        return None
-    return OperatingPoint(term, point, model, run, response, np.searchsorted(run.time, grid))
+    return OperatingPoint(term, point, term.build_task(point), run, response)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,16 +140,14 @@ class Disturbance:
     """Action of an effect on the driveline, or on the measured signals, over the steps of a run.
 
     `subject` is the element, gear or frequency to which the effect belongs; empty for one of the
-    whole driveline. `force` (N-1, 4) acts on the speeds of engine, output and wheel [N m],
-    `inputs` (N-1,) are changes of inputs by name, `outputs` (N,) direct changes of compared
-    signals by name, `respond` computes a change (N, 4) of the state that is already a response.
+    whole driveline. `torques` (N-1,) [N m] act on some of `NODES`, `inputs` (N-1,) are changes of
+    inputs by name, `outputs` (N,) direct changes of compared signals by name.
     """
 
     subject: str = ""
-    force: FloatArray | None = None
+    torques: Mapping[str, FloatArray] = field(default_factory=dict)
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
     outputs: Mapping[str, FloatArray] = field(default_factory=dict)
-    respond: Callable[[], FloatArray] | None = None
 
 
 Builder = Callable[[OperatingPoint, float], Sequence[Disturbance]]

@@ -19,7 +19,7 @@ from drivetwin.estimation.likelihood.effects.effect import (
     draw_walk,
 )
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
-from drivetwin.estimation.likelihood.noise.shift_response import build_slip_row
+from drivetwin.simulation.driveline import INPUT, OUTPUT, WHEEL
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId
 
@@ -32,7 +32,7 @@ def build_slow_load(at: OperatingPoint, std: float) -> list[Disturbance]:
     growth = std * at.load * at.model.i_f * float(np.sqrt(at.duration))
     columns = build_random_walk(at.progress, COUNT, growth)
     label = at.describe_shift()
-    return [Disturbance(label, at.build_force(2, -compute_middle(one))) for one in columns]
+    return [Disturbance(label, {WHEEL: -compute_middle(one)}) for one in columns]
 
 
 def apply_slow_load(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
@@ -67,7 +67,7 @@ def build_aero_load(at: OperatingPoint, std: float) -> list[Disturbance]:
     square = compute_middle(at.run.wheel_speed) ** 2
     growth = square / max(at.term.structure.mean_speed**2, 1e-9) - 1.0
     torque = std * at.load * at.model.i_f * growth
-    return [Disturbance(force=at.build_force(2, -torque))]
+    return [Disturbance(torques={WHEEL: -torque})]
 
 
 def apply_aero_load(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
@@ -99,7 +99,7 @@ def build_brake_drag(at: OperatingPoint, std: float) -> list[Disturbance]:
     A constant drag is part of the constant load, which is an unknown of the fit.
     """
     torque = std * at.load * at.model.i_f * (1.0 - compute_middle(at.progress))
-    return [Disturbance(at.describe_shift(), force=at.build_force(2, -torque))]
+    return [Disturbance(at.describe_shift(), {WHEEL: -torque})]
 
 
 def apply_brake_drag(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
@@ -194,8 +194,8 @@ def build_drum_inertia(at: OperatingPoint, std: float) -> list[Disturbance]:
         if one.name in stated:
             continue
         torque = size * at.compute_rate(at.run.slip[one.name])
-        force = -torque[:, None] * build_slip_row(at.model, one)
-        found.append(Disturbance(one.name, force))
+        torques = {INPUT: -torque / one.i_c, OUTPUT: torque * one.i_out}
+        found.append(Disturbance(one.name, torques))
     return found
 
 

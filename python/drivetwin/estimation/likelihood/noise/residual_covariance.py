@@ -25,7 +25,7 @@ passes less than half the sampling rate: a sample's variance times the sampling 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,12 +43,13 @@ class LinearResponse:
     """Discrete linear response on a time grid of N points.
 
     `transition` (N-1, S, S) takes the disturbance z of S states from one point to the next; `drive`
-    (N-1, S) by input name is the effect over a step of that input's disturbance; `step` (N-1,) [s].
+    (N-1, S) by input name is the effect over a step of that input's disturbance; `rows` (N, S) by
+    output are its derivatives by the states.
     """
 
-    step: FloatArray
     transition: FloatArray
     drive: Mapping[str, FloatArray]
+    rows: Mapping[str, FloatArray]
 
     @property
     def states(self) -> int:
@@ -107,6 +108,20 @@ class LinearResponse:
         """True if all transitions are finite numbers."""
         return bool(np.all(np.isfinite(self.transition)))
 
+    def show(self, z: FloatArray) -> dict[str, FloatArray]:
+        """Compute the changes (N, ...) of the outputs by name for z (N, S, ...)."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return {name: np.einsum("ns,ns...->n...", row, z) for name, row in self.rows.items()}
+
+    def add_feedback(self, name: str, slope: FloatArray, row: FloatArray) -> LinearResponse:
+        """Let an input follow the quantity of a `row` (N, S) over the states by `slope` (N-1,):
+        over each step the mean of both its ends."""
+        push = 0.5 * slope[:, None] * self.drive[name]
+        before, after = (push[:, :, None] * one[:, None, :] for one in (row[:-1], row[1:]))
+        ahead = np.linalg.inv(np.eye(self.states) - after)
+        drive = {one: np.einsum("kij,kj->ki", ahead, each) for one, each in self.drive.items()}
+        return replace(self, transition=ahead @ (self.transition + before), drive=drive)
+
 
 @dataclass(frozen=True)
 class ResidualCovarianceSettings:
@@ -118,22 +133,18 @@ class ResidualCovarianceSettings:
 
 
 RESIDUAL_COVARIANCE = ResidualCovarianceSettings()
+_PROBES = 8
+"""Instants at which a state is disturbed to see which outputs show it [count]."""
 
 
 @dataclass(frozen=True, eq=False)
 class SeenOutput:
-    """Samples of one output: its `row` (S,) or (N, S) over the states, the points `centre` (n,) of
-    the grid in the middle of what the samples show, and their noise `sigma`, one or (n,)."""
+    """Samples of one output: its `row` (N, S) over the states, the points `centre` (n,) of the grid
+    in the middle of what the samples show, and their noise `sigma`, one or (n,)."""
 
     row: FloatArray
     centre: NDArray[np.intp]
     sigma: float | FloatArray
-
-    def get_rows(self) -> FloatArray:
-        """Return the row of each sample (n, S)."""
-        if self.row.ndim == 1:
-            return np.tile(self.row, (self.centre.size, 1))
-        return np.asarray(self.row[self.centre])
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,6 +305,41 @@ def add_input_noise(sigma: FloatArray, response: LinearResponse, noise: InputNoi
     return Whitener(sigma**2, NoisePath(response, noise.power, inverse, seen, factor, noise.shared))
 
 
+def compute_quiet_noise(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:
+    """Compute the change (S,) of each state that an output shows by the noise of its sensor.
+
+    Of several outputs that show a state at once the sensor with the largest noise counts, which
+    leaves most digits to the weighting. A state that none shows at once, as a twist without a
+    torque sensor, shows some time later. One that no output ever shows has no unit to compare with:
+    its change counts as 1.
+    """
+    sizes = np.array([np.median(np.abs(out.row[out.centre]), axis=0) for out in outputs])
+    noise = np.array([[np.min(out.sigma)] for out in outputs])
+    changes = noise / np.where(sizes > 0.0, sizes, np.inf)
+    found = np.asarray(np.max(changes, axis=0), dtype=np.float64)
+    if np.all(found > 0.0):
+        return found
+    return np.where(found > 0.0, found, _probe_states(response, outputs))
+
+
+def _probe_states(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:
+    """Compute the change (S,) of each state that an output shows later by the noise of its
+    sensor."""
+    steps, states = len(response.transition), response.states
+    places = np.unique(np.linspace(0, steps - 1, _PROBES).astype(int))
+    push = np.zeros((steps, states, places.size * states))
+    for k, place in enumerate(places):
+        push[place, :, k * states : (k + 1) * states] = np.eye(states)
+    z = response.propagate_columns(push)
+    shown = np.zeros((places.size, states))
+    for out in outputs:
+        effect = np.einsum("...s,...sq->...q", out.row[out.centre], z[out.centre])
+        largest = np.max(np.abs(effect), axis=0) / np.min(out.sigma)
+        shown = np.maximum(shown, largest.reshape(places.size, states))
+    usual = np.median(shown, axis=0)
+    return np.where(usual > 0.0, 1.0 / np.where(usual > 0.0, usual, 1.0), 1.0)
+
+
 def _compute_process_noise(response: LinearResponse, noise: InputNoise) -> FloatArray:
     """Compute the process noise (N, S, S) between successive grid points; the first is that of the
     start."""
@@ -328,7 +374,7 @@ def _build_information(
     for out in outputs:
         weights = np.broadcast_to(1.0 / np.square(out.sigma), out.centre.shape)
         seen = np.bincount(out.centre, weights, minlength=count)
-        diagonal += seen[:, None, None] * (out.row[..., :, None] * out.row[..., None, :])
+        diagonal += seen[:, None, None] * (out.row[:, :, None] * out.row[:, None, :])
     banded = np.zeros((2 * states, states * count))
     for i in range(states):
         for j in range(i + 1):
@@ -340,7 +386,7 @@ def _build_information(
 
 def _build_observation(outputs: Sequence[SeenOutput], count: int, states: int) -> csr_array:
     """Build the observation matrix H (compared samples, S·N)."""
-    rows = np.concatenate([out.get_rows() for out in outputs])
+    rows = np.concatenate([out.row[out.centre] for out in outputs])
     centre = np.concatenate([out.centre for out in outputs])
     columns = (states * centre[:, None] + np.arange(states)).ravel()
     start = np.arange(centre.size + 1) * states

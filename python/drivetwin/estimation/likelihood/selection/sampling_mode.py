@@ -418,7 +418,7 @@ def _changes(term: ShiftTerm, point: ParameterVector) -> FloatArray:
         found[rows, SIGNALS.index(out.name)] = change
     bend = record.interpolate_bend(term.structure.get_value(point, "te_delay"))
     sign = -1.0 if record.curved else 1.0
-    answer = term.respond_to_inputs(point, run, {TORQUE: sign * bend})
+    answer = term.observe(term.compute_response(point), {TORQUE: sign * bend})
     if np.all(np.isfinite(answer)):  # an unstable run has no finite response
         found[:, -1] = answer
     return found
