@@ -154,7 +154,9 @@ class Problem:
         )
 
 
-def record(problem: Problem, rng: np.random.Generator) -> Realisation:
+def record(
+    problem: Problem, rng: np.random.Generator, clean: FloatArray | None = None
+) -> Realisation:
     """Draw a realisation: noise of inputs and outputs, prior means, measured start speeds.
 
     Parameters
@@ -163,13 +165,15 @@ def record(problem: Problem, rng: np.random.Generator) -> Realisation:
         Problem whose truth is simulated with the true inputs.
     rng
         Source of all draws.
+    clean
+        Outputs (m, n) without noise; those of the truth if None.
 
     Returns
     -------
     Realisation
         Recording and prior means.
     """
-    clean = problem.simulate()
+    clean = problem.simulate() if clean is None else clean
     if clean is None:
         raise RuntimeError(f"the true run of {problem.name} does not complete")
     inputs = {

@@ -24,6 +24,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import DrivetwinError
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
+from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
 
 CLOSE = 10.0
@@ -152,6 +153,20 @@ def fit(problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bo
     Found
         Estimates and cost.
     """
+    found = fit_model(problem, drawn, means, sigmas_known=sigmas_known)
+    return Found(
+        found.values,
+        found.std,
+        float(found.cost),
+        tuple(float(one.cost) for one in found.starts),
+        {name: str(found.estimates[name].verdict) for name in problem.unknowns},
+    )
+
+
+def fit_model(
+    problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bool = True
+) -> ModelFit:
+    """Fit a realisation as `fit` does, and return the result itself."""
     start = drawn.start if means is drawn.means else {**drawn.start, **_get_twists(problem, means)}
     model = problem.build(means, drawn.inputs, start)
     outputs = {
@@ -170,14 +185,7 @@ def fit(problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bo
     else:
         move_fixed(problem, model, drawn.moves)
     recording = Recording(drawn.inputs, outputs, known)
-    found = model.fit([recording], unknowns, wanted, tolerances=tolerances, seed=0)
-    return Found(
-        found.values,
-        found.std,
-        float(found.cost),
-        tuple(float(one.cost) for one in found.starts),
-        {name: str(found.estimates[name].verdict) for name in problem.unknowns},
-    )
+    return model.fit([recording], unknowns, wanted, tolerances=tolerances, seed=0)
 
 
 def _get_twists(problem: Problem, means: Values) -> dict[str, float]:

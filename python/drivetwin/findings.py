@@ -140,6 +140,7 @@ class Code(StrEnum):
     RATIO_OFF_CARD = auto()
     FIXED_NUMBER_REFINED = auto()
     FIXED_NUMBER_OFF = auto()
+    OMISSION_SHOWN = auto()
     GAIN_SUSPECT = auto()
     GAIN_ASSUMED = auto()
     MU_FOR_ASSUMED_GAIN = auto()

@@ -206,7 +206,7 @@ def test_a_number_without_any_effect_is_named_alone() -> None:
     assert found.values["idle.inertia"] == pytest.approx(1.0)
 
 
-def test_a_model_without_the_play_is_not_valid_and_identifies_nothing() -> None:
+def test_a_play_that_the_model_lacks_is_found() -> None:
     made = make_log(ModelName.TIP_IN)
     elements = [
         {key: value for key, value in {**one, "type": "spring_damper"}.items() if key != "gap"}
@@ -217,11 +217,13 @@ def test_a_model_without_the_play_is_not_valid_and_identifies_nothing() -> None:
     unknowns = {name: one for name, one in made.model.unknowns.items() if name != "shaft.gap"}
     wrong = replace(made.model, elements=elements, unknowns=unknowns)
     found = fit_network(wrong, [made.recording])
-    assert found.status is ModelStatus.NOT_VALID
-    assert found.chi2 > 2.0
-    codes = {one.code for one in found.findings}
-    assert Code.RESIDUAL_UNEXPLAINED in codes
-    assert all(one.verdict is not Verdict.IDENTIFIED for one in found.estimates.values())
+    (finding,) = (one for one in found.findings if one.code is Code.OMISSION_SHOWN)
+    assert finding.subject == "play of shaft"
+    assert found.status is ModelStatus.VALID
+    (moved,) = (one for one in found.moved if one.number.name == "play of shaft")
+    assert moved.value == pytest.approx(made.truth["shaft.gap"], abs=3.0 * moved.std)
+    for name in unknowns:
+        assert found.values[name] == pytest.approx(made.truth[name], abs=3.0 * found.std[name])
 
 
 def test_a_search_without_explanation_ends_at_its_work_limit(

@@ -93,7 +93,9 @@ def fit_network(model: NetworkModel, recordings: Sequence[Recording], *, seed: i
     plant = problem.terms[0].plant
     set_there = {one.path for one in plant.settings}
     fixed = list_fixed(plant.elements, plant.places, set_there, model.tolerances)
-    return conclude(model, numbers, search(problem, point, numbers.sought, fixed, seed))
+    return conclude(
+        model, numbers, search(problem, point, numbers.sought, fixed, model.tolerances, seed)
+    )
 
 
 def build_problem(
@@ -179,6 +181,10 @@ def _find_reach(numbers: ResolvedNumbers) -> dict[str, float]:
                 spread = _USUAL_DELAY if one.spread is None else _DELAY_REACH * one.spread
                 usual = abs(one.stated.value) + spread
                 reach[name] = min(usual, max(abs(one.spec.lower), abs(one.spec.upper)))
+    for derived in numbers.derived:
+        head, _, name = derived.name.partition(".")
+        if head == "delay" and not derived.arguments:
+            reach[name] = abs(derived.compute())
     return reach
 
 

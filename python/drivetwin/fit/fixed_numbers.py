@@ -30,6 +30,7 @@ class Source(StrEnum):
     DIGITS = "written digits"
     USUAL = "usual"
     STATED = "stated"
+    OMITTED = "omitted"
 
 
 @dataclass(frozen=True)

@@ -94,8 +94,8 @@ class Plant:
 
     @cached_property
     def _channels(self) -> dict[str, set[str]]:
-        """Names of the inputs, outputs and levels on which coordinates act."""
-        keys = [place.keys for _, place in self._acting]
+        """Names of the inputs, outputs and levels whose numbers are set."""
+        keys = [place.keys for _, place in (*self._acting, *self._settings)]
         return {
             table: {str(one[1]) for one in keys if one[0] == table}
             for table in ("inputs", "outputs", "levels")

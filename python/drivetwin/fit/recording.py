@@ -234,6 +234,17 @@ class NetworkRecord(ComparedOutputs):
             inputs[name] = replace(signal, values=read - held_back[name])
         return replace(self, inputs=inputs, held_back=held_back)
 
+    def extend_inputs(self, beyond: float) -> NetworkRecord:
+        """Hold the ends of each input for a time `beyond` [s] more, so that its delay may move."""
+        return replace(
+            self,
+            inputs={name: _hold_ends(one, beyond) for name, one in self.inputs.items()},
+            input_variance=_pad_ends(self.input_variance),
+            held_back=_pad_ends(self.held_back),
+            fast=_pad_ends(self.fast),
+            windows=_pad_ends(self.windows),
+        )
+
     def compute_power(
         self, names: Collection[str], delays: Mapping[str, float]
     ) -> dict[str, FloatArray]:
@@ -251,6 +262,17 @@ class NetworkRecord(ComparedOutputs):
             name: np.interp(self.time, self.inputs[name].time + delays[name], values)
             for name, values in self.held_back.items()
         }
+
+
+def _hold_ends(signal: Signal, beyond: float) -> Signal:
+    """Return a signal that holds the values of its ends for a time `beyond` [s]."""
+    time = np.concatenate([[signal.time[0] - beyond], signal.time, [signal.time[-1] + beyond]])
+    return replace(signal, time=time, values=np.pad(signal.values, 1, mode="edge"))
+
+
+def _pad_ends(columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return columns (n + 2,) with one more sample at each end."""
+    return {name: np.pad(one, 1, mode="edge") for name, one in columns.items()}
 
 
 def _average_blocks(signal: Signal, size: int) -> Signal:

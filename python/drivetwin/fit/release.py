@@ -70,7 +70,7 @@ def release_fixed(
     kept = _select(found, fixed, count) if fixed else []
     if not kept:
         return found, ()
-    problem, point = _extend(found.problem, found.point, kept)
+    problem, point = extend(found.problem, found.point, kept)
     for _ in range(2):  # the second with the weighting of the common minimum
         best = minimise(problem, point, settings=settings)
         if best is None:
@@ -86,7 +86,7 @@ _FAILED = (
 )
 
 
-def _extend(
+def extend(
     problem: Problem, point: ParameterVector, fixed: Sequence[FixedNumber]
 ) -> tuple[Problem, ParameterVector]:
     """Return the problem and its point with the coordinates of the fixed numbers behind."""
@@ -94,7 +94,10 @@ def _extend(
     prior = problem.prior
     for _ in fixed:
         prior = prior.append(0.0, 1.0)
-    terms = [replace(one, plant=replace(one.plant, fixed=fixed)) for one in problem.terms]
+    terms = [
+        replace(one, plant=replace(one.plant, fixed=(*one.plant.fixed, *fixed)))
+        for one in problem.terms
+    ]
     reach = np.full(count, RELEASE.reach)
     wider = replace(
         problem,
@@ -112,7 +115,7 @@ def _select(
     found: OptimizeResult[Problem], fixed: Sequence[FixedNumber], count: int
 ) -> list[FixedNumber]:
     """Select the fixed numbers that widen an unknown or that the recordings show."""
-    problem, point = _extend(found.problem, found.point, fixed)
+    problem, point = extend(found.problem, found.point, fixed)
     normal = problem.normal(point)
     if normal is None:
         raise IdentificationError(*_FAILED)

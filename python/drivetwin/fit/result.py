@@ -32,9 +32,10 @@ from drivetwin.estimation.result.verdict import (
     compute_correlation,
 )
 from drivetwin.findings import Code, Finding, Number, Severity, report
-from drivetwin.fit.expression import ResolvedNumbers
+from drivetwin.fit.expression import Expression, ResolvedNumbers
 from drivetwin.fit.fixed_numbers import FixedNumber, Source, Tolerance
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.omissions import ShownOmission
 from drivetwin.fit.profile import trace_slow, widen
 from drivetwin.fit.search import FoundMinimum, RefinedStart
 from drivetwin.fit.term import NetworkTerm, Problem
@@ -137,6 +138,8 @@ class MovedNumber:
     def finding(self) -> Finding | None:
         """Finding where the recordings determine the number and exclude the stated value."""
         one = self.number
+        if one.source is Source.OMITTED:
+            return None
         apart = abs(self.value - one.value)
         if self.std > VERDICT.prior_share * one.std or apart <= PRIOR.agreement * self.std:
             return None
@@ -217,8 +220,14 @@ class ModelFit(EstimatesMixin):
             for one in self.moved
             if one.number.source is Source.DIGITS
         }
+        channels = {
+            one.number.name: Expression(repr(one.value))
+            for one in self.moved
+            if one.number.places[0][0] in ("inputs", "outputs")
+        }
         return replace(
             self.model,
+            expressions={**self.model.expressions, **channels},
             tolerances={**written, **self.model.tolerances},
             elements=task.elements,
             inputs={**self.model.inputs, **term.plant.compute_tables(self.minimum.point)["levels"]},
@@ -296,7 +305,7 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
     """Judge the unknowns and the model at a minimum."""
     minimum, sought = found.result, numbers.sought
     problem, chi2 = minimum.problem, _compute_chi2(minimum)
-    covariance = compute_covariance(problem, minimum.normal, chi2)
+    covariance = compute_covariance(problem, minimum.normal, chi2) + found.spread
     is_explained = chi2 <= FIT_GATE.plausible_chi2 and not found.is_limited
     profiles = trace_slow(minimum, covariance, len(sought)) if is_explained else {}
     covariance, by_profile = widen(covariance, profiles, problem.prior)
@@ -317,6 +326,7 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
     findings = (
         *failures,
         *ended,
+        *_report_omissions(found.shown, moved),
         *doubts,
         *(one for one in remarks if one is not None),
         *_collect_findings(minimum, sought, len(found.fixed)),
@@ -356,6 +366,20 @@ def _describe_moved(
         std = one.std * float(np.sqrt(variance[k]))
         std *= value / one.value if one.is_relative else 1.0
         yield MovedNumber(one, value, std, sought[most].name, float(shares[most]))
+
+
+def _report_omissions(
+    shown: Sequence[ShownOmission], moved: Sequence[MovedNumber]
+) -> Iterator[Finding]:
+    """Yield a finding for each omission that is in the model, one of the `moved` numbers."""
+    for one in shown:
+        at = next(each for each in moved if each.number is one.number)
+        if abs(at.value - at.number.value) < Z95 * at.std and not at.number.is_relative:
+            continue  # another omission has taken its place
+        size = Number(at.value, one.number.unit or "1", Z95 * at.std)
+        yield report(
+            Code.OMISSION_SHOWN, one.number.name, size=size, evidence=one.evidence, moved=at.widens
+        )
 
 
 def _compute_chi2(minimum: OptimizeResult[Problem]) -> float:

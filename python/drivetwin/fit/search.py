@@ -8,7 +8,7 @@ draws from the priors side by side; only the best are refined.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -26,6 +26,7 @@ from drivetwin.estimation.optimize.gauss_newton import (
 )
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.fixed_numbers import FixedNumber
+from drivetwin.fit.omissions import ShownOmission, complete_model
 from drivetwin.fit.release import release_fixed
 from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import SoughtNumber
@@ -86,12 +87,15 @@ class FoundMinimum:
 
     `is_limited` is True if the work limit ended the search before a minimum explained the
     recordings. `fixed` are the numbers beside the unknowns that are coordinates of the best one.
+    The `shown` omissions are among them; `spread` (p, p) is the covariance that others add.
     """
 
     result: OptimizeResult[Problem]
     starts: tuple[RefinedStart, ...]
     is_limited: bool
     fixed: tuple[FixedNumber, ...] = ()
+    shown: tuple[ShownOmission, ...] = ()
+    spread: FloatArray | float = 0.0
 
     @property
     def agreeing(self) -> int:
@@ -105,6 +109,7 @@ def search(
     start: ParameterVector,
     sought: Sequence[SoughtNumber],
     fixed: Sequence[FixedNumber],
+    stated: Collection[str],
     seed: int,
 ) -> FoundMinimum:
     """Find the minimum of Q: over the unknowns, then over the fixed numbers as well.
@@ -120,6 +125,8 @@ def search(
         screen.
     fixed
         Numbers beside the unknowns that are not exact.
+    stated
+        Paths of numbers whose distribution is stated.
     seed
         Seed of the draws.
 
@@ -146,9 +153,13 @@ def search(
     with scale_progress(0.58, 1.0):
         best = _polish(problem, attempts.best.point)
         best, moved = release_fixed(best, fixed, len(sought), BENT)
+        complete = complete_model(best, stated, BENT)
+        best, shown = complete.result, complete.shown
         is_limited = budget.left < 0.0 and not _is_explained(best.normal.cost, problem.size)
         best = best if is_limited else _expect_inputs(best)
-        return FoundMinimum(best, tuple(attempts.starts), is_limited, moved)
+        beside = (*moved, *(one.number for one in shown))
+        starts = tuple(attempts.starts)
+        return FoundMinimum(best, starts, is_limited, beside, shown, complete.spread)
 
 
 def _coarsen(problem: Problem) -> Problem:

@@ -1,0 +1,368 @@
+# SPDX-License-Identifier: MIT
+"""Omissions: numbers that a network or its channels may lack, sought at the minimum of a fit.
+
+An omission is zero in the model as stated: the drag of a shaft, a torque that no input has, the
+delay of a channel, a slope of friction. Its column is the derivative of the recording by it (a
+score test). With A and b its information and pull, the coordinates adjusted, both over the residual
+power, a standard deviation S of its size gives
+
+    ln B(S) = ½·b²/(A + S⁻²) - ½·ln(1 + S²·A)
+
+averaged over S about the usual one. The likeliest omission is put into the model, with its
+likeliest S as prior, while it is likelier than its absence. Each of the others widens the
+covariance by its moves, times its probability.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.roles import Quantity
+from drivetwin.estimation.likelihood.fit import invert_information
+from drivetwin.estimation.optimize.gauss_newton import GaussNewtonSettings, OptimizeResult, minimise
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.result.cause import EXPLAINED
+from drivetwin.fit.fixed_numbers import FixedNumber, Source
+from drivetwin.fit.places import list_places
+from drivetwin.fit.quantities import find_input_quantity
+from drivetwin.fit.release import extend
+from drivetwin.fit.term import NetworkTerm, Problem
+from drivetwin.fit.unknown import ASCII_UNITS
+from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.element_schema import GROUND
+from drivetwin.simulation.network import Element, Output, Start, simulate
+
+
+@dataclass(frozen=True)
+class OmissionSettings:
+    """Settings of the search for omissions."""
+
+    odds: float = 0.05
+    """Odds that an omission is present in a model that somebody takes for complete [ratio]."""
+    torque_share: float = 0.005
+    """Usual drag, or torque without a source, over the largest torque [ratio]."""
+    pressure_delay: float = 0.01
+    """Usual delay of a pressure: line and valve [s]."""
+    torque_delay: float = 0.02
+    """Usual delay of an engine torque: calculation and bus [s]."""
+    longest_delay: float = 0.2
+    """Longest delay of an input [s]."""
+    play_share: float = 0.2
+    """Usual play of a shaft over its largest twist [ratio]."""
+    occam: float = 3.0
+    """Log evidence that the unknown size of a play takes: it is known to a twentieth of its
+    spread."""
+    output_delay: float = 0.002
+    """Usual delay of an output: filter of its sensor [s]."""
+    friction_slope: float = 5e-5
+    """Usual slope of friction over slip: 0.005 over 100 rad/s [s/rad]."""
+    spread: float = 2.3
+    """Standard deviation of the logarithm of a size: a factor of ten."""
+    nodes: int = 9
+    """Sizes over which the evidence is averaged, within two of these deviations [count]."""
+    least_share: float = 1e-6
+    """Least share of its information beside that of the unknowns: an omission without it is an
+    unknown by another name [ratio]."""
+    most: int = 4
+    """Most omissions that are put into a model [count]."""
+
+
+OMISSIONS = OmissionSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Omission:
+    """Number at a `path` that is as stated where nothing was left out; `size` is the usual one, SI.
+
+    `element` is the element that has it, where the network does not; it takes the place of one of
+    its name. `is_positive` is True where a negative amount makes no sense.
+    """
+
+    name: str
+    path: str
+    size: float
+    element: Element | None = None
+    is_positive: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ShownOmission:
+    """Omission that is in the model of a minimum, with its log `evidence` before."""
+
+    number: FixedNumber
+    evidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class CompletedFit:
+    """Minimum whose last coordinates are the omissions that the recordings show.
+
+    `spread` (p, p) is the covariance that the others add.
+    """
+
+    result: OptimizeResult[Problem]
+    shown: tuple[ShownOmission, ...]
+    spread: FloatArray
+
+
+def complete_model(
+    found: OptimizeResult[Problem], stated: Collection[str], settings: GaussNewtonSettings
+) -> CompletedFit:
+    """Put the omissions that the recordings show into the model, and minimise again.
+
+    Parameters
+    ----------
+    found
+        Minimum of the model as stated.
+    stated
+        Paths whose distribution is stated: nothing is left out there.
+    settings
+        Settings of the search.
+    """
+    stated_model, found = found, _extend_inputs(found)
+    candidates = _list_omissions(found, stated)
+    plays = _list_plays(found)
+    shown: list[ShownOmission] = []
+    while len(shown) < OMISSIONS.most:
+        weighed = _weigh_all(found, candidates)
+        best = max(weighed, key=lambda one: one.nats, default=None)
+        if best is not None and best.weight >= 1.0:
+            candidates = [one for one in candidates if one is not best.omission]
+            nats, better = best.nats, _put_into_model(found, best, settings)
+        elif plays and not is_explained(found):
+            nats, better = _put_play(found, plays.pop(), settings)
+        else:
+            break
+        if better is not None:
+            found = better
+            shown.append(ShownOmission(found.problem.terms[0].plant.fixed[-1], nats))
+    if shown and found.normal.cost > EXPLAINED * found.problem.size:
+        # What leaves a residual as it is explains nothing.
+        found, shown = stated_model, []
+        weighed = _weigh_all(found, candidates)
+    total = 1.0 + sum(one.weight for one in weighed)
+    size = len(found.point.names)
+    spread = np.zeros((size, size))
+    for one in weighed:
+        spread += one.weight / total * one.power * np.outer(one.moves, one.moves)
+    return CompletedFit(found, tuple(shown), spread)
+
+
+def _extend_inputs(found: OptimizeResult[Problem]) -> OptimizeResult[Problem]:
+    """Return a minimum whose inputs reach beyond the recordings, by what delays may move them."""
+    terms = tuple(
+        replace(one, record=one.record.extend_inputs(OMISSIONS.longest_delay))
+        for one in found.problem.terms
+    )
+    return replace(found, problem=replace(found.problem, terms=terms))
+
+
+def _list_omissions(found: OptimizeResult[Problem], stated: Collection[str]) -> list[Omission]:
+    """List what the networks of a minimum may lack."""
+    term = found.problem.terms[0]
+    plant = term.plant
+    taken = {*stated, *(one.path for one in plant.settings)}
+    moved = {keys for one in plant.fixed for keys in one.places}
+    delays = {
+        Quantity.PRESSURE: OMISSIONS.pressure_delay,
+        Quantity.TORQUE: OMISSIONS.torque_delay,
+    }
+    listed = []
+    for path, one in plant.places.items():
+        size = 0.0
+        if one.field == "friction.mu_v":
+            size = OMISSIONS.friction_slope
+        elif one.field == "delay" and one.keys[0] == "outputs":
+            size = OMISSIONS.output_delay
+        elif one.field == "delay" and one.keys[1] in term.record.inputs:
+            size = delays.get(find_input_quantity(str(one.keys[1]), plant.elements), 0.0)
+        if size > 0.0 and path not in taken and one.keys not in moved:
+            listed.append(Omission(path, path, size))
+    speeds, power = _measure_run(term, found.point)
+    for node, speed in speeds.items():
+        size = OMISSIONS.torque_share * power / speed
+        name = f"drag at {node}"
+        table = {"slip": [speed], "torque": [0.0]}
+        drag = {"type": "viscous_coupling", "name": name, "a": node, "b": GROUND, **table}
+        listed.append(Omission(name, f"{name}.torque.0", size, drag, is_positive=True))
+        name = f"torque at {node}"
+        load = {"type": "road_load", "name": name, "node": node, **_NO_LOAD}
+        listed.append(Omission(name, f"{name}.constant", size, load))
+    return listed
+
+
+def _list_plays(found: OptimizeResult[Problem]) -> list[Omission]:
+    """List the plays of shafts whose torque reverses, about a fifth of their largest twist."""
+    term = found.problem.terms[0]
+    task = term.plant.build_task(found.point, term.record.inputs, term.record.time)
+    springs = [one for one in task.elements if one["type"] == "spring_damper"]
+    outputs: list[Output] = [("shaft_torque", str(one["name"])) for one in springs]
+    run = simulate(task.elements, task.inputs, task.start, task.time, outputs)
+    plays = []
+    for one, output in zip(springs, outputs, strict=True):
+        torque = run.columns[output]
+        if np.min(torque) < 0.0 < np.max(torque) and one["stiffness"] > 0.0:
+            gap = OMISSIONS.play_share * float(np.max(np.abs(torque))) / float(one["stiffness"])
+            name = str(one["name"])
+            stated = next(each for each in term.plant.elements if each["name"] == name)
+            play = {**stated, "type": "backlash", "gap": gap}
+            plays.append(Omission(f"play of {name}", f"{name}.gap", gap, play))
+    return plays
+
+
+_NO_LOAD = {"constant": 0.0, "rolling": 0.0, "aero": 0.0}
+
+
+def _admit(
+    found: OptimizeResult[Problem], listed: Sequence[Omission]
+) -> tuple[Problem, ParameterVector]:
+    """Return the problem and the point of a minimum with a coordinate for each omission."""
+    new = {one.element["name"]: one.element for one in listed if one.element is not None}
+    known = {one["name"] for one in found.problem.terms[0].plant.elements}
+    added = [one for name, one in new.items() if name not in known]
+    terms = []
+    for term in found.problem.terms:
+        plant = term.plant
+        elements = [*(new.get(one["name"], one) for one in plant.elements), *added]
+        own = list_places(elements, Start({}), (), {}, {})
+        places = {**plant.places, **own}
+        quiet = None if added else term.quiet  # of other states
+        plant = replace(plant, elements=elements, places=places)
+        terms.append(replace(term, plant=plant, quiet=quiet))
+    numbers = []
+    for one in listed:
+        place = terms[0].plant.places[one.path]
+        unit, is_play = place.schema.unit.translate(ASCII_UNITS), place.field == "gap"
+        numbers.append(
+            FixedNumber(
+                one.name,
+                float(place.value),
+                one.size,
+                unit,
+                is_relative=is_play,
+                places=(place.keys,),
+                source=Source.OMITTED,
+            )
+        )
+    return extend(replace(found.problem, terms=tuple(terms)), found.point, numbers)
+
+
+def _measure_run(term: NetworkTerm, point: ParameterVector) -> tuple[dict[str, float], float]:
+    """Measure the largest speed [rad/s] of each node with an inertia that turns, and the largest
+    torques of the inputs times these speeds [W]."""
+    task = term.plant.build_task(point, term.record.inputs, term.record.time)
+    nodes = [str(one["node"]) for one in task.elements if one["type"] == "inertia"]
+    outputs: list[Output] = [("speed", node) for node in dict.fromkeys(nodes)]
+    run = simulate(task.elements, task.inputs, task.start, task.time, outputs)
+    speeds = {one[1]: float(np.max(np.abs(run.columns[one]))) for one in outputs}
+    power = 0.0
+    for one in task.elements:
+        if one["type"] == "torque":
+            signal = task.inputs[one["input"]]
+            largest = float(np.max(np.abs(signal.values))) if isinstance(signal, Signal) else 0.0
+            power += speeds.get(str(one["node"]), 0.0) * largest
+        elif one["type"] == "engine_map":
+            power += speeds.get(str(one["node"]), 0.0) * float(np.max(np.abs(one["map"]["torque"])))
+    return {node: one for node, one in speeds.items() if one > 0.0}, power
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighed:
+    """Omission with its log evidence.
+
+    In units of its `likeliest` size over the usual one are the mean `amount`, the mean square
+    `power` and the `moves` (p,) of the coordinates.
+    """
+
+    omission: Omission
+    likeliest: float
+    nats: float
+    amount: float
+    power: float
+    moves: FloatArray
+
+    @property
+    def weight(self) -> float:
+        """Probability of the omission over that of its absence."""
+        return OMISSIONS.odds * math.exp(min(self.nats, 700.0))
+
+
+def _weigh_all(found: OptimizeResult[Problem], listed: Sequence[Omission]) -> list[_Weighed]:
+    """Weigh each omission by itself at a minimum; empty where no run shows them."""
+    problem, point = _admit(found, listed)
+    normal = problem.normal(point) if listed else None
+    if normal is None:
+        return []
+    size = len(found.point.names)
+    information, cross = normal.information[:size, :size], normal.information[:size, size:]
+    moves = -invert_information(information) @ cross
+    counted = max(normal.cost / problem.size, 1.0)
+    alone = np.diag(normal.information)[size:] - 1.0
+    own = alone + np.sum(cross * moves, axis=0)
+    pull = -(normal.gradient[size:] + moves.T @ normal.gradient[:size])
+    return [
+        _weigh(one, float(a) / counted, float(b) / counted, move)
+        for one, a, b, move, all_of_it in zip(listed, own, pull, moves.T, alone, strict=True)
+        if a > OMISSIONS.least_share * all_of_it
+    ]
+
+
+def _weigh(one: Omission, own: float, pull: float, moves: FloatArray) -> _Weighed:
+    """Weigh an omission with the information `own` and the pull of its amount in usual sizes."""
+    pull = max(pull, 0.0) if one.is_positive else pull
+    ends = 2.0 * OMISSIONS.spread
+    logs = np.linspace(-ends, ends, OMISSIONS.nodes)
+    prior = -0.5 * (logs / OMISSIONS.spread) ** 2
+    variance = np.exp(2.0 * logs)
+    shrunk = variance / (1.0 + variance * own)
+    nats = 0.5 * pull**2 * shrunk - 0.5 * np.log1p(variance * own)
+    best = int(np.argmax(nats + prior))
+    evidence = float(logsumexp(nats + prior) - logsumexp(prior))
+    size = float(np.exp(logs[best]))
+    amount = float(pull * shrunk[best]) / size
+    power = float(shrunk[best]) / size**2 + amount**2
+    return _Weighed(one, size, evidence, amount, power, size * moves)
+
+
+def _put_play(
+    found: OptimizeResult[Problem], play: Omission, settings: GaussNewtonSettings
+) -> tuple[float, OptimizeResult[Problem] | None]:
+    """Minimise with a play; return the log evidence, and None where it is not shown."""
+    problem, point = _admit(found, [play])
+    first = minimise(problem, point, settings=settings)
+    if first is None:
+        return 0.0, None
+    counted = max(first.normal.cost / problem.size, 1.0)
+    nats = 0.5 * (found.normal.cost - first.normal.cost) / counted - OMISSIONS.occam
+    if OMISSIONS.odds * math.exp(min(nats, 700.0)) < 1.0:
+        return nats, None
+    again = first.problem.update_weighting(first.point)
+    return nats, minimise(again, first.point, settings=settings)
+
+
+def is_explained(found: OptimizeResult[Problem]) -> bool:
+    """Return whether Q of a minimum is that of noise, within its scatter."""
+    size = found.problem.size
+    return bool(found.normal.cost < size + 3.0 * np.sqrt(2.0 * size))
+
+
+def _put_into_model(
+    found: OptimizeResult[Problem], one: _Weighed, settings: GaussNewtonSettings
+) -> OptimizeResult[Problem] | None:
+    """Minimise with an omission as last coordinate; None where that falls short of its evidence."""
+    number = replace(one.omission, size=one.likeliest * one.omission.size)
+    problem, point = _admit(found, [number])
+    start = np.append(found.point.values + one.amount * one.moves, one.amount)
+    start = np.clip(start, problem.lower, problem.upper)
+    for values in (start, point.values):
+        first = minimise(problem, point.replace_values(values), settings=settings)
+        if first is not None and first.normal.cost < found.normal.cost:
+            again = first.problem.update_weighting(first.point)
+            return minimise(again, first.point, settings=settings)
+    return None

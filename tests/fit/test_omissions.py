@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Omissions of a model that a fit finds, and those that it leaves alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.findings import Code
+from drivetwin.fit.fit import fit_network, predict
+from drivetwin.fit.fixed_numbers import Tolerance
+from drivetwin.fit.recording import Recording
+from drivetwin.fit.result import ModelFit
+from drivetwin.fit.synthesize import ModelName
+from tests.support.fits import fit_log, make_log
+
+LATE = 0.015
+
+
+def list_shown(found: ModelFit) -> list[str]:
+    return [one.subject for one in found.findings if one.code is Code.OMISSION_SHOWN]
+
+
+def read_early(recording: Recording, name: str) -> Recording:
+    """Return a recording with an input read earlier than it acts."""
+    one = recording.inputs[name]
+    early = replace(one, values=np.interp(one.time + LATE, one.time, one.values))
+    return replace(recording, inputs={**recording.inputs, name: early})
+
+
+def require_truth(found: ModelFit, truth: dict[str, float]) -> None:
+    assert found.status is ModelStatus.VALID
+    for key, value in truth.items():
+        assert abs(found.values[key] - value) < 3.5 * found.std[key], key
+
+
+@pytest.mark.parametrize("name", ModelName)
+def test_a_complete_model_lacks_nothing(name: ModelName) -> None:
+    assert list_shown(fit_log(name)) == []
+
+
+def test_the_delay_of_a_pressure_is_found_and_acts_in_predictions() -> None:
+    made = make_log(ModelName.ENGINE_START)
+    late = read_early(made.recording, "K0")
+    found = fit_network(made.model, [late])
+    assert list_shown(found) == ["delay.K0"]
+    (moved,) = (one for one in found.moved if one.number.name == "delay.K0")
+    assert moved.value == pytest.approx(LATE, abs=3.5 * moved.std)
+    require_truth(found, dict(made.truth))
+    assert predict(found, [late])[0].chi2 == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_delay_that_is_stated_as_exact_is_not_sought() -> None:
+    made = make_log(ModelName.ENGINE_START)
+    exact = replace(made.model, tolerances={"delay.K0": Tolerance(exact=True)})
+    found = fit_network(exact, [read_early(made.recording, "K0")])
+    assert "delay.K0" not in list_shown(found)
+
+
+def test_drag_that_the_model_lacks_is_found() -> None:
+    made = make_log(ModelName.CONVERTER_LOCK_UP)
+    elements = [{**one, "aero": 0.0} if "aero" in one else one for one in made.model.elements]
+    found = fit_network(replace(made.model, elements=elements), [made.recording])
+    assert list_shown(found) == ["drag at wheel"]
+    require_truth(found, {key: made.truth[key] for key in made.truth if key != "load.constant"})
