@@ -5,16 +5,23 @@ from __future__ import annotations
 
 import ast
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import MISSING, fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
 from typer.core import TyperGroup
 
+from drivetwin._util.request import COMMANDS as REQUESTS
+from drivetwin._util.request import Request, get_arguments
 from drivetwin.cli import app, main
+from drivetwin.cli.examples import EXAMPLES
+from drivetwin.errors import InputError
 
 
 def commands(group: object, *before: str) -> Iterator[tuple[str, ...]]:
@@ -37,6 +44,51 @@ def test_a_group_without_a_command_prints_its_help(
     assert "\nCommands:\n" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("name", "call"), [(k, one) for k in EXAMPLES for one in EXAMPLES[k]])
+def test_every_example_is_a_call_of_its_command(name: str, call: str) -> None:
+    assert main_parses(shlex.split(call)) == name
+
+
+def main_parses(arguments: list[str]) -> str:
+    """Parse a call as the program does, without running it; return the name of the command."""
+    command: Any = typer.main.get_command(app)
+    context = command.make_context("drivetwin", arguments)
+    while isinstance(command, TyperGroup):
+        name, command, arguments = command.resolve_command(
+            context, [*context._protected_args, *context.args]
+        )
+        context = command.make_context(name, arguments, parent=context)
+    path = str(context.command_path).removeprefix("drivetwin ")
+    request = REQUESTS[path]
+    values = {
+        key: value
+        for key, value in context.params.items()
+        if context.get_parameter_source(key).name == "COMMANDLINE" and key in get_arguments(request)
+    }
+    request(**{**dict.fromkeys(_list_required(request), "x"), **values})
+    return path
+
+
+def _list_required(request: type[Request]) -> list[str]:
+    return [one.name for one in fields(request) if one.default is MISSING]
+
+
+EXCLUSIONS = [
+    (name, argument, other)
+    for name, request in REQUESTS.items()
+    for argument, declared in get_arguments(request).items()
+    for other in declared.excludes
+]
+
+
+@pytest.mark.parametrize(("name", "argument", "other"), EXCLUSIONS)
+def test_options_that_exclude_each_other_are_refused(name: str, argument: str, other: str) -> None:
+    request = REQUESTS[name]
+    given = dict.fromkeys([*_list_required(request), argument, other], "x")
+    with pytest.raises(InputError, match=f"--{other.replace('_', '-')} has no effect here"):
+        request(**given)
+
+
 PYTHON_TYPE = re.compile(
     r"<(?:list|str|int|float|bool|path|Path|tuple|dict|text)\b[^>]*>|\b(?:list|dict|tuple)\[", re.I
 )
@@ -54,8 +106,10 @@ def test_help_of_every_command_is_for_people(
     assert "None" not in text
     if call:
         assert ("--json" in text) == (call != ("app",))
-        # A list of choices is one word.
-        assert max(len(line) for line in text.splitlines() if "|" not in line) <= 80
+        assert max(map(len, text.splitlines())) <= 80
+        assert "\n  Examples:\n    drivetwin " in text
+        assert "\n  Exit codes:\n      0  done\n" in text
+        assert ("--strict" in text) == ("\n      3  " in text)
     else:
         assert all(f"\n  {command} " in text for command, *_ in COMMANDS)
         assert "..." not in text.partition("Commands:")[2]

@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.findings import Code, report
+from drivetwin.report.blocks import Tone
 from drivetwin.report.bus import explain_bus
 from tests.support.bus_logs import write_log, write_ratio_card
 
@@ -84,8 +85,8 @@ def test_strict_refuses_logs_of_which_too_little_follows(
     assert capsys.readouterr().out.startswith("Bus logs: ")
     contradiction = report(Code.BUS_SHIFTS_CONTRADICT, shift="2-3", quantity="f_d", p=1e-6)
     verdict = explain_bus({}, [contradiction], ())
-    assert not verdict.is_confirmed
-    assert "2-3 contradicts the other shifts" in verdict.block.reason
+    assert verdict.tone is not Tone.GOOD
+    assert "2-3 contradicts the other shifts" in verdict.reason
 
 
 def test_an_output_torque_needs_a_vehicle_card(

@@ -61,13 +61,10 @@ class Ageing:
 
 @dataclass(frozen=True)
 class Truth:
-    """Parameters of the fleet. In unit `changed`, μ is larger by `step` from `at` [1000 km]."""
+    """Parameters of the fleet."""
 
     mu: Ageing = Ageing(0.1181, 0.0040, -4.0e-5)
     P0: Ageing = Ageing(8.0e4, 3.0e3, 40.0)
-    changed: int = 13
-    at: float = 120.0
-    step: float = 0.012
 
 
 @dataclass(frozen=True)
@@ -166,13 +163,12 @@ def plan(count: int, truth: Truth, seed: int = 0) -> list[Made]:
     for number, reading in enumerate(odometer.tolist()):
         unit = number % UNITS
         age = reading - 0.5 * ODOMETER
-        step = truth.step if unit == truth.changed and reading >= truth.at else 0.0
         made.append(
             Made(
                 path=f"unit_{unit:02d}/log_{number:05d}_at_{reading:.3f}_Mm.csv",
                 unit=f"{unit:02d}",
                 odometer=reading,
-                mu=mu_unit[unit] + truth.mu.drift * age + step,
+                mu=mu_unit[unit] + truth.mu.drift * age,
                 P0=P0_unit[unit] + truth.P0.drift * age,
                 damage=ways[number % len(ways)] if number in damaged else "",
             )

@@ -175,9 +175,12 @@ class Request:
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    command_name: ClassVar[str] = ""
+    """Name of the command, of which `fleet run` has two words."""
 
     def __init_subclass__(cls, command: str = "") -> None:
         if command:
+            cls.command_name = command
             COMMANDS[command] = cls
         dataclass(init=False, repr=False, eq=False, match_args=False, kw_only=True)(cls)
 

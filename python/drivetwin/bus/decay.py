@@ -30,9 +30,8 @@ from drivetwin.bus.drift import (
     fit_noise,
     regress,
 )
-from drivetwin.bus.quantities import SQUARE
 from drivetwin.bus.recording import Signal, average_neighbours
-from drivetwin.bus.scatter import Combined, ShiftValue, combine
+from drivetwin.bus.scatter import SQUARE, Combined, ShiftValue, combine
 from drivetwin.bus.torque import compute_swing_response, integrate_torque
 from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.findings import Code, Number, explain

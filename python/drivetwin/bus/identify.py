@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -26,22 +26,22 @@ from drivetwin.bus.decay import (
     fit_decays,
     predict_decay,
 )
-from drivetwin.bus.phases import BusShift, Timeline, estimate_ratios, find_timeline
-from drivetwin.bus.quantities import (
+from drivetwin.bus.phases import BusShift, Timeline, estimate_ratios, find_timeline, sample_speeds
+from drivetwin.bus.recording import BusLog, prepare_bus_log
+from drivetwin.bus.road_load import RoadLoad
+from drivetwin.bus.scatter import (
     DAMPING,
     DELAY,
     FREQUENCY,
     RATIO,
     SQUARE,
+    Combined,
+    combine,
     make_estimate,
     refuse,
 )
-from drivetwin.bus.recording import BusLog, prepare_bus_log
-from drivetwin.bus.road_load import RoadLoad
-from drivetwin.bus.scatter import Combined, combine
 from drivetwin.bus.torque import TorqueBalance
 from drivetwin.bus.torque_estimates import estimate_torques, find_dead_time
-from drivetwin.bus.unknown_ratios import find_unknown_ratios
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
 from drivetwin.estimation.direct.ringdown import RING_DOWN
@@ -49,7 +49,14 @@ from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.shifts.causes import report_unknown_ratios
-from drivetwin.shifts.held_ratios import HeldRatio, is_held
+from drivetwin.shifts.held_ratios import (
+    RESTS,
+    HeldRatio,
+    find_held_ratios,
+    is_held,
+    is_ratio,
+    merge_equal_ratios,
+)
 from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.vehicle.spec import Z95
 
@@ -337,3 +344,14 @@ class _ResultBuilder:
                 one = make_estimate(stem, gear, value, std, joint.combined, text)
                 self.estimates[one.id] = one
             self.findings += find_contradictions(f"the resonance in gear {gear}", joint.combined)
+
+
+def find_unknown_ratios(logs: Iterable[BusLog], card: RatioCard) -> list[HeldRatio]:
+    """Find the ratios that rest for `RESTS` and are on no gear of the card."""
+    found = merge_equal_ratios(
+        one
+        for log in logs
+        for stretch in log.stretches
+        for one in find_held_ratios(sample_speeds(log, stretch, 0.0), RESTS)
+    )
+    return [one for one in found if not any(is_ratio(one, gear) for gear in card.ratios.values())]

@@ -11,19 +11,19 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.bus.decay import JointDecay
 from drivetwin.bus.phases import PhaseName, Timeline
-from drivetwin.bus.quantities import (
+from drivetwin.bus.road_load import RoadLoad, combine_loads, estimate_loads
+from drivetwin.bus.scatter import (
     DEAD_TIME,
     ENGINE,
     LOAD,
     MASS,
     TOTAL,
     VEHICLE,
+    ShiftValue,
     make_estimate,
     make_id,
     refuse,
 )
-from drivetwin.bus.road_load import RoadLoad, combine_loads, estimate_loads
-from drivetwin.bus.scatter import ShiftValue
 from drivetwin.bus.torque import (
     TORQUE,
     ClosingClutch,

@@ -7,28 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
-from drivetwin._util.request import FileRole, Request, argument, flag
-from drivetwin.cli.arguments import find_mapping, mapping_option
+from drivetwin._util.request import FileRole, Request, argument
+from drivetwin.cli.arguments import find_mapping, mapping_option, strict_flag
 from drivetwin.cli.card_new import new
 from drivetwin.cli.command_group import CommandGroup
-from drivetwin.cli.output import (
-    print_findings,
-    print_json,
-    print_line,
-    show_error,
-    show_step,
-    to_error_document,
-)
+from drivetwin.cli.output import show_step, to_error_document
 from drivetwin.errors import CardError, DrivetwinError
 from drivetwin.findings import Code, Finding, report, select_warnings
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.vehicle.vehicle_card import VehicleCard
-
-IMPLAUSIBLE = 3
-"""Exit code of a card with findings, with --strict."""
 
 
 class CheckCard(Request, command="card check"):
@@ -39,10 +28,10 @@ class CheckCard(Request, command="card check"):
         "Log of the vehicle: CSV, MDF, MAT, Parquet, bus log.", "LOG", default=None
     )
     channels: Path | None = mapping_option()
-    strict: bool = flag("Exit with code 3 if an entry is implausible.")
+    strict: bool = strict_flag("every entry is plausible")
 
 
-def check(request: CheckCard, *, as_json: bool) -> None:
+def check(request: CheckCard) -> Outcome:
     """Report implausible entries of a vehicle card, before an identification.
 
     Each finding names the entry, its value, the value or range expected, the reason and the remedy.
@@ -51,6 +40,7 @@ def check(request: CheckCard, *, as_json: bool) -> None:
     cannot be read.
     """
     from drivetwin.files.records import dump_findings
+    from drivetwin.report.sections.findings import build_findings_section
     from drivetwin.vehicle.card import load_card
 
     try:
@@ -59,19 +49,14 @@ def check(request: CheckCard, *, as_json: bool) -> None:
         fault.remedy += _describe_ratios(request.log, request.channels)
         raise
     findings, refusal = _compare(vehicle, request.log, request.channels)
-    warnings = select_warnings(findings)
-    if as_json:
-        error = None if refusal is None else to_error_document(refusal)["error"]
-        print_json({"findings": dump_findings(findings), "refusal": error})
-    else:
-        print_findings(findings)
-        print_line(f"{request.card_file}: {_count_findings(findings)}")
-        if refusal is not None:
-            show_error(refusal, as_json=False)
-    if refusal is not None:
-        raise typer.Exit(refusal.exit_code)
-    if request.strict and warnings:
-        raise typer.Exit(IMPLAUSIBLE)
+    error = None if refusal is None else to_error_document(refusal)["error"]
+    return Outcome(
+        build_findings_section(findings).blocks,
+        {"findings": dump_findings(findings), "refusal": error},
+        is_confirmed=not select_warnings(findings),
+        fault=refusal,
+        lines=[f"{request.card_file}: {_count_findings(findings)}"],
+    )
 
 
 def _count_findings(findings: Sequence[Finding]) -> str:

@@ -15,7 +15,8 @@ import typer
 from typer.core import TyperGroup
 
 from drivetwin._util.visible_text import escape_line
-from drivetwin.cli.options import bind_command
+from drivetwin.cli.examples import format_end
+from drivetwin.cli.options import bind_command, get_request
 
 WRONG_USAGE = 2
 """Exit code of a call without a command."""
@@ -86,22 +87,34 @@ def build_command(name: str, entry: Entry) -> Any:
     if isinstance(entry, CommandGroup):
         return entry
     single = typer.Typer(add_completion=False, **PLAIN)
-    single.command(name)(bind_command(entry))
+    single.command(name, epilog=format_end(get_request(entry)))(bind_command(entry))
     command = typer.main.get_command(single)
     for parameter in command.params:
-        vars(parameter)["display_type"] = lambda *_, one=parameter: _describe_type(one)
+        described = vars(parameter)
+        choices = _list_choices(parameter)
+        listed = all(one in (described["help"] or "") for one in choices)
+        if sum(map(len, choices)) > _LONGEST and not listed:
+            described["help"] = f"{described['help']} One of {', '.join(choices)}."
+        described["display_type"] = lambda *_, one=parameter: _describe_type(one)
     return command
 
 
+_LONGEST = 40
+"""Letters of choices that stand beside the name of an option; those of more are in its help."""
 _KINDS = {int: "N", float: "NUMBER"}
 """Words for the values of an option in place of Python types; all others are texts."""
 
 
+def _list_choices(parameter: Any) -> list[str]:
+    """List the values of a parameter that has a closed set of them."""
+    kind = parameter.type_descriptor
+    return [str(getattr(one, "value", one)) for one in kind.choices] if kind.is_choice else []
+
+
 def _describe_type(parameter: Any) -> str:
     """Describe the values of a parameter for help: its choices, or a word in place of a type."""
-    described = parameter.type_descriptor
-    if described.is_choice:
-        return f"<{'|'.join(str(getattr(one, 'value', one)) for one in described.choices)}>"
-    return (
-        "" if parameter.param_type_name == "argument" else _KINDS.get(described.annotation, "TEXT")
-    )
+    choices = _list_choices(parameter)
+    if choices and sum(map(len, choices)) <= _LONGEST:
+        return f"<{'|'.join(choices)}>"
+    is_named = choices or parameter.param_type_name == "argument"
+    return "" if is_named else _KINDS.get(parameter.type_descriptor.annotation, "TEXT")

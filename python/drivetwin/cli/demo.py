@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from drivetwin._util.display_units import format_uncertainty, get_display_unit
 from drivetwin._util.request import output_folder
 from drivetwin.cli.arguments import REPORT
-from drivetwin.cli.output import print_blocks, print_json, print_line, print_paragraph
 from drivetwin.cli.synth import Bench
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.report.blocks import Column, TableBlock, make_table
+from drivetwin.report.blocks import Column, TableBlock, TextBlock, make_table
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.dyno.truth import Truth
@@ -57,7 +57,7 @@ class Demonstrate(Bench, command="demo"):
     output: Path = output_folder("Folder for all files.", default=Path("drivetwin-demo"))
 
 
-def demo(request: Demonstrate, *, as_json: bool) -> None:
+def demo(request: Demonstrate) -> Outcome:
     """Identify a synthetic log with known truth by two methods, and compare."""
     from drivetwin.cli.identify_run import IdentifyOptions, run_identification, write_outcome
     from drivetwin.cli.synth import write_run
@@ -76,17 +76,12 @@ def demo(request: Demonstrate, *, as_json: bool) -> None:
     found = {method: outcome.found for method, outcome in outcomes.items()}
     rows = _compare(bench.truth, found)
     report = output / DEFAULT_METHOD / REPORT
-    if as_json:
-        print_json(
-            {"parameters": [row.to_document() for row in rows], "log": log, "report": report}
-        )
-        return
-    print_blocks([_build_table(rows, scenario)])
-    print_paragraph(
-        "± is the half width of the 95 % interval; the paper's method states none for its grids."
+    note = "± is the half width of the 95 % interval; the paper's method states none for its grids."
+    return Outcome(
+        [_build_table(rows, scenario), TextBlock(note)],
+        {"parameters": [row.to_document() for row in rows], "log": log, "report": report},
+        lines=[f"log, card and truth: {log.parent}", f"report: {report}"],
     )
-    print_line(f"log, card and truth: {log.parent}")
-    print_line(f"report: {report}")
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import Request, argument, option, output_folder
 from drivetwin.cli.arguments import GEARBOX_HELP
-from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
+from drivetwin.cli.output import show_step
 from drivetwin.report.blocks import TextBlock, Tone, make_notes
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.drive import DriveRun
@@ -40,7 +41,7 @@ class Drive(Request, command="drive"):
     output: Path | None = output_folder(f"Folder for {FIGURE} and {TRACES}.")
 
 
-def drive(request: Drive, *, as_json: bool) -> None:
+def drive(request: Drive) -> Outcome:
     """Simulate a drive from standstill with converter, lock-up and all kinds of shift.
 
     Print a table of all shifts: start, duration of slip at the input, friction work and peak power
@@ -65,13 +66,12 @@ def drive(request: Drive, *, as_json: bool) -> None:
     with show_step(f"driving {box.name}"):
         motion = run(box, chosen, plan)
         files = _write_outputs(request.output, motion, title) if request.output else ()
-    if as_json:
-        print_json(_to_document(motion) | {"gearbox": box.name, "powertrain": chosen.name})
-        return
-    print_blocks([TextBlock(title), build_shift_table(motion), build_energy_table(motion)])
-    print_blocks(make_notes("Warnings", motion.warnings, Tone.DOUBTFUL))
-    for file in files:
-        print_line(f"wrote {file}")
+    blocks = [
+        *(TextBlock(title), build_shift_table(motion), build_energy_table(motion)),
+        *make_notes("Warnings", motion.warnings, Tone.DOUBTFUL),
+    ]
+    names = {"gearbox": box.name, "powertrain": chosen.name}
+    return Outcome(blocks, _describe_drive(motion) | names, files)
 
 
 def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
@@ -83,7 +83,7 @@ def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ..
     return write_texts(folder, texts)
 
 
-def _to_document(motion: DriveRun) -> dict[str, Any]:
+def _describe_drive(motion: DriveRun) -> dict[str, Any]:
     return {
         "duration": float(motion.time[-1]),
         "shifts": [

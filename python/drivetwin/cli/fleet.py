@@ -20,11 +20,13 @@ from drivetwin._util.request import (
     output_file,
     output_folder,
 )
+from drivetwin.cli.arguments import strict_flag
 from drivetwin.cli.command_group import CommandGroup
-from drivetwin.cli.output import print_blocks, print_json, print_line, show_step
+from drivetwin.cli.output import NOT_CONFIRMED, print_blocks, print_line, show_step
 from drivetwin.errors import INTERRUPTED, InputError
 from drivetwin.fleet.options import FleetOptions
-from drivetwin.report.blocks import make_notes, make_table
+from drivetwin.report.blocks import Tone, VerdictBlock, make_notes, make_table
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.fleet.events import Summary
@@ -47,6 +49,7 @@ class RunFleet(FleetOptions, FleetFiles, command="fleet run"):
     """Arguments of `fleet run`."""
 
     as_json: bool = flag("Print one JSON event per line on stdout.", "--json")
+    strict: bool = strict_flag("every log is identified")
 
 
 class StoreInput(Request):
@@ -79,6 +82,24 @@ def run(request: RunFleet) -> None:
         _print_summary(summary, request.output)
     if not summary.complete:
         raise typer.Exit(INTERRUPTED)
+    if request.strict and summary.failures:
+        raise typer.Exit(NOT_CONFIRMED)
+
+
+def _explain(summary: Summary, output: Path) -> VerdictBlock:
+    """Build the verdict on a run with the next step."""
+    status = f"{summary.done} of {summary.files - summary.skipped} logs identified"
+    tone = Tone.DOUBTFUL
+    if not summary.complete:
+        reason, action = "The run was interrupted.", "The same command goes on from here."
+    elif summary.failures:
+        name, count = max(summary.failures.items(), key=lambda one: one[1])
+        reason = f"The most frequent cause, of {count} logs, is {name}."
+        action = "Read the reasons with the query below."
+    else:
+        reason, tone = "No log failed.", Tone.GOOD
+        action = f"Write the report with 'drivetwin fleet report {output}'."
+    return VerdictBlock(status, reason, action, tone, "Fleet")
 
 
 def _print_summary(summary: Summary, output: Path) -> None:
@@ -89,11 +110,10 @@ def _print_summary(summary: Summary, output: Path) -> None:
         "left out by the rules": summary.skipped,
         "computed in this run": summary.computed,
     }
-    print_blocks([make_table(f"Fleet in {output}", ("logs", ("count", "d")), rows.items())])
-    print_blocks(make_notes("Failures", (f"{n} {name}" for name, n in summary.failures.items())))
-    if not summary.complete:
-        print_line("interrupted; the same command goes on from here")
-    elif summary.failures:
+    counts = make_table(f"Fleet in {output}", ("logs", ("count", "d")), rows.items())
+    failures = (f"{n} {name}" for name, n in summary.failures.items())
+    print_blocks([_explain(summary, output), counts, *make_notes("Failures", failures)])
+    if summary.complete and summary.failures:
         print_line(f"reasons: drivetwin fleet query {output} \"SELECT path, what FROM files "
             "JOIN logs USING (log) WHERE error <> ''\"")  # fmt: skip
 
@@ -106,7 +126,7 @@ class ReportFleet(StoreInput, command="fleet report"):
     )
 
 
-def report(request: ReportFleet, *, as_json: bool) -> None:
+def report(request: ReportFleet) -> Outcome:
     """Write the report of a store: shared values, ageing, units, outliers, failures."""
     from drivetwin.fleet.report import PAGE as REPORT
     from drivetwin.fleet.report import save_fleet_report
@@ -115,10 +135,7 @@ def report(request: ReportFleet, *, as_json: bool) -> None:
     page = request.store / REPORT if request.output is None else request.output
     with show_step("estimating over the fleet"), Store(request.store) as opened:
         save_fleet_report(opened, page)
-    if as_json:
-        print_json({"report": page})
-        return
-    print_line(f"wrote {page}")
+    return Outcome(document={"report": page}, files=[page])
 
 
 class EstimateFleet(StoreInput, command="fleet estimate"):
@@ -129,7 +146,7 @@ class EstimateFleet(StoreInput, command="fleet estimate"):
     )
 
 
-def estimate(request: EstimateFleet, *, as_json: bool) -> None:
+def estimate(request: EstimateFleet) -> Outcome:
     """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
     from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
     from drivetwin.fleet.report import build_estimate_blocks
@@ -139,10 +156,8 @@ def estimate(request: EstimateFleet, *, as_json: bool) -> None:
         found = estimate_fleet(opened, request.parameter)
         missing = list_missing_estimates(opened, found, request.parameter)
         blocks = build_estimate_blocks(opened, found, missing, request.store)
-    if as_json:
-        print_json({"estimates": [one.to_document() for one in found], "missing": missing})
-        return
-    print_blocks(blocks)
+    listed = [one.to_document() for one in found]
+    return Outcome(blocks, {"estimates": listed, "missing": missing})
 
 
 class QueryFleet(StoreInput, command="fleet query"):
@@ -160,7 +175,7 @@ class QueryFleet(StoreInput, command="fleet query"):
     )
 
 
-def query(request: QueryFleet, *, as_json: bool) -> None:
+def query(request: QueryFleet) -> Outcome:
     """Query a store in SQL (DuckDB).
 
     Tables: parameters, frictions, fits, qualities, warnings, rows, files, logs, shifts, settings.
@@ -174,20 +189,17 @@ def query(request: QueryFleet, *, as_json: bool) -> None:
         answer = query_store(opened, request.sql, limits)
     if output is not None:
         save_answer(answer, output, request.store)
-    if as_json:
-        rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
-        print_json({"rows": rows})
-        return
+    rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     if output is not None:
-        print_line(f"wrote {output}")
-        return
+        return Outcome((), {"rows": rows}, [output])
     numbers = {
         name
         for name, column in zip(answer.columns, zip(*answer.rows, strict=True), strict=False)
         if all(isinstance(cell, int | float | None) for cell in column)
     }
     columns = [(name, "s") if name in numbers else name for name in answer.columns]
-    print_blocks([make_table("", columns, (map(_format_cell, row) for row in answer.rows))])
+    table = make_table("", columns, (map(_format_cell, row) for row in answer.rows))
+    return Outcome([table], {"rows": rows})
 
 
 def _format_cell(value: object) -> str:

@@ -5,15 +5,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from drivetwin._util.request import Request, argument, option, output_file
 from drivetwin.cli.arguments import GEARBOX_HELP
-from drivetwin.cli.output import print_blocks, print_json, print_line
-from drivetwin.report.blocks import Tone, make_notes
+from drivetwin.report.blocks import Block, Tone, make_notes
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
-    from drivetwin.gearbox import Gearbox, GearStatics
+    from drivetwin.gearbox import Gearbox
 
 
 class ShowGearbox(Request, command="gearbox"):
@@ -26,7 +26,7 @@ class ShowGearbox(Request, command="gearbox"):
     )
 
 
-def gearbox(request: ShowGearbox, *, as_json: bool) -> None:
+def gearbox(request: ShowGearbox) -> Outcome:
     """List the gears of a gearbox with computed and published ratio.
 
     Without CARD, list the built-in gearboxes. With --gear, print the speed of every member per
@@ -42,11 +42,7 @@ def gearbox(request: ShowGearbox, *, as_json: bool) -> None:
 
     if request.card is None:
         names = list_builtin_gearboxes()
-        if as_json:
-            print_json({"builtin": list(names)})
-        else:
-            print_line("\n".join(names))
-        return
+        return Outcome(document={"builtin": list(names)}, lines=names)
     box = load_gearbox(request.card)
     if request.output is not None:
         _write_modelica(box, request.output)
@@ -54,13 +50,15 @@ def gearbox(request: ShowGearbox, *, as_json: bool) -> None:
     names = (gear,) if gear is not None else tuple(each.name for each in box.gears)
     gears = [solve_gear(box, name) for name in names]
     warnings = describe_ratio_differences(box, {each.gear: each.ratio for each in gears})
-    if as_json:
-        documents = [_to_document(box, each) for each in gears]
-        print_json({"gearbox": box.name, "gears": documents, "warnings": warnings})
-        return
-    print_blocks([build_ratio_table(box, gears), *make_notes("Warnings", warnings, Tone.DOUBTFUL)])
+    blocks: list[Block] = [
+        build_ratio_table(box, gears),
+        *make_notes("Warnings", warnings, Tone.DOUBTFUL),
+    ]
     if gear is not None:
-        print_blocks(build_gear_blocks(gears[0]))
+        blocks += build_gear_blocks(gears[0])
+    listed = [asdict(one) | {"published": box.get_gear(one.gear).published} for one in gears]
+    files = () if request.output is None else (request.output,)
+    return Outcome(blocks, {"gearbox": box.name, "gears": listed, "warnings": warnings}, files)
 
 
 def _write_modelica(box: Gearbox, path: Path) -> None:
@@ -72,7 +70,3 @@ def _write_modelica(box: Gearbox, path: Path) -> None:
     write_text(
         path, format_package(box.name, build_network_elements(box), note=box.name, ends=ends)
     )
-
-
-def _to_document(box: Gearbox, gear: GearStatics) -> dict[str, Any]:
-    return asdict(gear) | {"published": box.get_gear(gear.gear).published}

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -12,17 +12,11 @@ from typing import TYPE_CHECKING
 from drivetwin._util.outputs import Output
 from drivetwin._util.request import Request, flag, input_file, option
 from drivetwin.cli.arguments import find_mapping, log_argument, mapping_option
-from drivetwin.cli.output import (
-    print_blocks,
-    print_findings,
-    print_json,
-    print_line,
-    print_paragraph,
-    show_step,
-    to_error_document,
-)
+from drivetwin.cli.output import print_line, show_step, to_error_document
 from drivetwin.errors import DrivetwinError, UnitError
 from drivetwin.findings import Finding
+from drivetwin.report.blocks import Block, TextBlock, make_notes
+from drivetwin.report.outcome import Outcome
 from drivetwin.report.sections.inputs import build_column_table
 
 if TYPE_CHECKING:
@@ -49,7 +43,7 @@ class Inspect(Request, command="inspect"):
     )
 
 
-def inspect(request: Inspect, *, as_json: bool) -> None:
+def inspect(request: Inspect) -> Outcome:
     """List the columns of a log with unit, rate, range, gaps and proposed role.
 
     Also list the warnings of shifts and identify, and their reason if they refuse the log.
@@ -83,37 +77,41 @@ def inspect(request: Inspect, *, as_json: bool) -> None:
         if write_mapping is not None and accept:
             seen = _look_at(log, card, read_mapping(write_mapping))
             draft = draft_mapping(seen.survey, unnamed_step=seen.unnamed_step)
-    if as_json:
-        error = None if seen.refusal is None else to_error_document(seen.refusal)["error"]
-        remarks = {"findings": dump_findings(seen.findings), "refusal": error}
-        print_json(seen.survey.to_document() | {"proposals": draft.proposed_units} | remarks)
-        return
-    _print_seen(seen, draft, log.name)
-    if write_mapping is not None:
-        print_line(f"wrote {write_mapping}")
+    error = None if seen.refusal is None else to_error_document(seen.refusal)["error"]
+    remarks = {"findings": dump_findings(seen.findings), "refusal": error}
+    document = seen.survey.to_document() | {"proposals": draft.proposed_units} | remarks
+    files = () if write_mapping is None else (write_mapping,)
+    return Outcome([*_build_seen(seen, draft, log.name)], document, files)
 
 
-def _print_seen(seen: _Seen, draft: Draft, name: str) -> None:
-    """Print the columns of a log, notes, open units with their proposals, and findings."""
+def _build_seen(seen: _Seen, draft: Draft, name: str) -> Iterator[Block]:
+    """Build the columns of a log, notes, open units with their proposals, and findings."""
+    from drivetwin.report.sections.findings import build_findings_section
+
     found = seen.survey
-    _print_columns(found.columns, name)
-    for text in found.notes:
-        print_paragraph(text)
+    shown = _select_shown(found.columns)
+    yield build_column_table(shown, f"Columns of {name}")
+    notes = list(found.notes)
+    if len(shown) < len(found.columns):
+        more = len(found.columns) - len(shown)
+        notes.insert(0, f"{more} more columns, all without a role: --json lists them")
     if draft.proposed_units:
         listed = ", ".join(
             f"{role} ({' or '.join(units) or 'no proposal'})"
             for role, units in draft.proposed_units.items()
         )
-        print_paragraph(
+        notes.append(
             f"no unit, proposed from the values: {listed}; state it in a channel mapping: "
             "--write-mapping channels.toml writes one, with --accept-proposals with the units "
             "that are the only proposal"
         )
-    print_findings(one for one in seen.findings if one.names.get("text") not in found.notes)
+    yield from make_notes("Notes", notes)
+    others = (one for one in seen.findings if one.names.get("text") not in found.notes)
+    yield from build_findings_section(tuple(others)).blocks
     if seen.refusal is not None:
         proposed = isinstance(seen.refusal, UnitError) and draft.proposed_units
         reason = replace(seen.refusal, remedy="") if proposed else seen.refusal
-        print_paragraph(f"{seen.refused_by} this log: {reason}")
+        yield TextBlock(f"{seen.refused_by} this log: {reason}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,11 +239,3 @@ def _select_shown(columns: Sequence[Column]) -> list[Column]:
     free = (k for k, column in enumerate(columns) if not column.roles)
     last = next(islice(free, _MOST_ROWS, None), len(columns))
     return [column for k, column in enumerate(columns) if k < last or column.roles]
-
-
-def _print_columns(columns: Sequence[Column], source: str) -> None:
-    shown = _select_shown(columns)
-    print_blocks([build_column_table(shown, f"Columns of {source}")])
-    if len(shown) < len(columns):
-        more = len(columns) - len(shown)
-        print_paragraph(f"{more} more columns, all without a role: --json lists them")

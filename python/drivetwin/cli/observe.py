@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 from drivetwin._util.outputs import LOG_ENDINGS, PAGE, select_outputs
 from drivetwin._util.request import output_file
 from drivetwin.cli.arguments import TwinLogInput, read_twin_log
-from drivetwin.cli.output import print_blocks, print_json, print_line, print_paragraph, show_step
+from drivetwin.cli.output import show_step
 from drivetwin.errors import DamagedChannelError
+from drivetwin.report.blocks import Tone, make_notes
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.logs.raw import RawChannel
@@ -32,7 +34,7 @@ class Observe(TwinLogInput, command="observe"):
     )
 
 
-def observe(request: Observe, *, as_json: bool) -> None:
+def observe(request: Observe) -> Outcome:
     """Estimate torques of output shaft and clutches in the shifts of a log, with 95 % bands.
 
     The log needs no output torque; if it has one, it is not used.
@@ -53,16 +55,13 @@ def observe(request: Observe, *, as_json: bool) -> None:
         _write_observations(table, found)
     for page in select_outputs(request.output, *PAGE):
         write_text(page, render_observations(found, recording))
-    if as_json:
-        shown = [_to_document(one) for one in found]
-        print_json({"shifts": shown, "left_out": left_out})
-        return
-    for one in found:
-        print_blocks(build_torque_blocks(one))
-    for name, reason in left_out.items():
-        print_paragraph(f"shift {name} is left out: {reason}")
-    for file in request.output:
-        print_line(f"wrote {file}")
+    reasons = [f"Shift {name}: {reason}" for name, reason in left_out.items()]
+    blocks = [block for one in found for block in build_torque_blocks(one)]
+    return Outcome(
+        [*blocks, *make_notes("Left out", reasons, Tone.DOUBTFUL)],
+        {"shifts": [_describe_torques(one) for one in found], "left_out": left_out},
+        request.output,
+    )
 
 
 def _observe_shifts(
@@ -122,7 +121,7 @@ def collect_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
     )
 
 
-def _to_document(one: Observation) -> dict[str, Any]:
+def _describe_torques(one: Observation) -> dict[str, Any]:
     return {
         "from": one.shift.start_gear,
         "to": one.shift.end_gear,

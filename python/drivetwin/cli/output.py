@@ -138,14 +138,14 @@ def deliver(outcomes: Iterable[Outcome], *, as_json: bool, strict: bool) -> None
     made = []
     for one in outcomes:
         made.append(one)
-        if as_json:
+        if as_json or one.is_json:
             continue
         print_blocks(one.blocks)
         for line in (*one.lines, *(f"wrote {file}" for file in one.files)):
             print_line(line)
         if one.fault is not None:
             show_error(one.fault, as_json=False)
-    if as_json:
+    if as_json or any(one.is_json for one in made):
         documents = [_build_document(one) for one in made]
         print_json(documents[0] if len(documents) == 1 else {"results": documents})
     for one in reversed(made):

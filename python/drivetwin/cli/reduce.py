@@ -4,16 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import REQUIRED, Request, argument, option
 from drivetwin.cli.arguments import GEARBOX_HELP
-from drivetwin.cli.output import print_blocks, print_json
 from drivetwin.errors import InputError
 from drivetwin.report.blocks import Tone, make_notes
-
-if TYPE_CHECKING:
-    from drivetwin.report.gearbox import ReducedShift
+from drivetwin.report.outcome import Outcome
 
 
 class Reduce(Request, command="reduce"):
@@ -23,7 +19,7 @@ class Reduce(Request, command="reduce"):
     shift: str = option("The two gears, such as 2-3.", metavar="OLD-NEW", default=REQUIRED)
 
 
-def reduce(request: Reduce, *, as_json: bool) -> None:
+def reduce(request: Reduce) -> Outcome:
     """Reduce a shift to the dual-clutch form and compute the error of the reduction.
 
     Print the ratios of both elements, the mass matrix, and condition (1) with the members that
@@ -42,17 +38,11 @@ def reduce(request: Reduce, *, as_json: bool) -> None:
     ratios = {old: reduction.off_going.ratio, new: reduction.on_coming.ratio}
     warnings = describe_ratio_differences(box, ratios)
     found = evaluate_reduction(reduction)
-    if as_json:
-        print_json(_to_document(found) | {"warnings": warnings})
-        return
-    print_blocks(build_reduction_blocks(found))
-    print_blocks(make_notes("Warnings", warnings, Tone.DOUBTFUL))
-
-
-def _to_document(found: ReducedShift) -> dict[str, Any]:
-    reduction = found.reduction
-
-    return {
+    blocks = [
+        *build_reduction_blocks(found),
+        *make_notes("Warnings", warnings, Tone.DOUBTFUL),
+    ]
+    document = {
         "gearbox": reduction.gearbox.name,
         "from": reduction.from_gear,
         "to": reduction.to_gear,
@@ -67,4 +57,6 @@ def _to_document(found: ReducedShift) -> dict[str, Any]:
         "violations": [each.member for each in reduction.violations],
         "error_simulated": None if found.error is None else asdict(found.error),
         "no_error_because": found.reason or None,
+        "warnings": warnings,
     }
+    return Outcome(blocks, document)

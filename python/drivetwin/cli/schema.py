@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from drivetwin._util.request import Request, argument, build_request_schema, option
-from drivetwin.cli.output import print_json, print_line
 from drivetwin.files.schemas import FileKind, build_json_schema
+from drivetwin.report.outcome import Outcome
 
 
 class PrintSchema(Request, command="schema"):
@@ -19,13 +19,10 @@ class PrintSchema(Request, command="schema"):
     )
 
 
-def schema(request: PrintSchema, *, as_json: bool) -> None:
+def schema(request: PrintSchema) -> Outcome:
     """Print the JSON Schema of a kind of file, for editors; without KIND, list the kinds."""
     if request.command is not None:
-        print_json(build_request_schema(request.command))
-    elif request.kind is not None:
-        print_json(build_json_schema(request.kind))
-    elif as_json:
-        print_json({"kinds": list(FileKind)})
-    else:
-        print_line("\n".join(FileKind))
+        return Outcome(document=build_request_schema(request.command), is_json=True)
+    if request.kind is not None:
+        return Outcome(document=build_json_schema(request.kind), is_json=True)
+    return Outcome(document={"kinds": list(FileKind)}, lines=list(FileKind))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,15 +12,10 @@ from drivetwin._util.display_units import format_uncertainty
 from drivetwin._util.outputs import PAGE
 from drivetwin._util.request import FileRole, input_file, output_file
 from drivetwin.cli.arguments import LogInput, find_mapping
-from drivetwin.cli.output import (
-    print_blocks,
-    print_findings,
-    print_json,
-    print_line,
-    print_paragraph,
-    show_step,
-)
-from drivetwin.report.blocks import TableBlock, make_table
+from drivetwin.cli.output import show_step
+from drivetwin.errors import InputError, Where
+from drivetwin.report.blocks import Block, TableBlock, TextBlock, make_notes, make_table
+from drivetwin.report.outcome import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
@@ -48,7 +43,7 @@ class DetectShifts(LogInput, command="shifts"):
     )
 
 
-def shifts(request: DetectShifts, *, as_json: bool) -> None:
+def shifts(request: DetectShifts) -> Outcome:
     """Detect the shifts of a log, with phases and shift quality.
 
     For several shifts, state the distribution of each figure by kind and gears, outliers and trend.
@@ -58,7 +53,9 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     With a card of the ratios alone, list the shifts of a bus log and their phases.
     """
     from drivetwin.files.records import dump_findings
+    from drivetwin.report.sections.findings import build_findings_section
     from drivetwin.report.sections.summary import build_phase_table
+    from drivetwin.report.whole_drive import build_comparison_table
     from drivetwin.shifts.causes import find_causes
     from drivetwin.shifts.detect import find_gear_spans
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
@@ -68,8 +65,7 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     from drivetwin.vehicle.ratio_card import is_ratio_card
 
     if is_ratio_card(request.vehicle):
-        _show_bus_shifts(request, as_json)
-        return
+        return _show_bus_shifts(request)
     card = load_card(request.vehicle)
     recording, found = _find_shifts(request, card, request.log)
     others = [
@@ -81,33 +77,33 @@ def shifts(request: DetectShifts, *, as_json: bool) -> None:
     findings = (*recording.findings, *find_causes(recording, card))
     if request.output is not None and found.shifts:
         _write_page(request.output, found.shifts, recording, comparison)
-    if as_json:
-        remarks = {"findings": dump_findings(findings)}
-        compared = {"comparison": [asdict(one) for one in comparison]} if request.against else {}
-        print_json(_to_document(found, closings, seen) | compared | remarks)
-        return
+    compared = {"comparison": [asdict(one) for one in comparison]} if request.against else {}
     labels = make_shift_labels(found.shifts)
-    print_blocks(build_phase_table(*one) for one in zip(labels, found.shifts, strict=True))
+    blocks: list[Block] = [
+        build_phase_table(*one) for one in zip(labels, found.shifts, strict=True)
+    ]
     if not found.shifts:
         held = ", ".join(dict.fromkeys(gear for gear, _ in find_gear_spans(recording, card)))
-        print_paragraph(f"no gear shift; gear held: {held or 'none'}")
-    _print_details(found, closings, seen)
-    if request.against:
-        _print_comparison(comparison)
-    print_findings(findings)
-    if request.output is not None and found.shifts:
-        print_line(f"wrote {request.output}")
+        blocks.append(TextBlock(f"no gear shift; gear held: {held or 'none'}"))
+    blocks += _build_details(found, closings, seen)
+    if comparison:
+        blocks.append(build_comparison_table(comparison))
+    elif request.against:
+        blocks.append(TextBlock("comparison: no shifts of the same kind and gears in both"))
+    blocks += build_findings_section(findings).blocks
+    document = _describe_shifts(found, closings, seen) | compared
+    files = (request.output,) if request.output is not None and found.shifts else ()
+    return Outcome(blocks, document | {"findings": dump_findings(findings)}, files)
 
 
-def _show_bus_shifts(request: DetectShifts, as_json: bool) -> None:
+def _show_bus_shifts(request: DetectShifts) -> Outcome:
     """List the shifts of a bus log; raise InputError for options that need shift quality."""
-    from drivetwin.cli.shifts_bus import refuse_quality, show_bus_shifts
 
     if request.against:
         raise refuse_quality(request.vehicle, "--against")
     if request.output is not None:
         raise refuse_quality(request.vehicle, "--output")
-    show_bus_shifts(request.log, request.vehicle, request.channels, as_json=as_json)
+    return show_bus_shifts(request.log, request.vehicle, request.channels)
 
 
 def _find_shifts(
@@ -132,15 +128,6 @@ def _write_page(
 
     with show_step(f"writing {path.name}"):
         write_text(path, render_whole_drive(shifts, log, comparison))
-
-
-def _print_comparison(comparison: Sequence[FigureComparison]) -> None:
-    from drivetwin.report.whole_drive import build_comparison_table
-
-    if comparison:
-        print_blocks([build_comparison_table(comparison)])
-    else:
-        print_paragraph("comparison: no shifts of the same kind and gears in both")
 
 
 class _SpeedResults(NamedTuple):
@@ -169,7 +156,7 @@ def _estimate_from_speeds(
         )
 
 
-def _to_document(
+def _describe_shifts(
     found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults
 ) -> dict[str, Any]:
     from drivetwin.files.result_file import ShiftRecord
@@ -185,54 +172,56 @@ def _to_document(
     }
 
 
-def _print_details(found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults) -> None:
-    """Print the details below the table of the shifts: text and further tables."""
+def _build_details(
+    found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults
+) -> Iterator[Block]:
+    """Build what stands below the table of the shifts: notes and further tables."""
     from drivetwin.report.whole_drive import build_quality_tables, build_summary_tables
     from drivetwin.shifts.summary import summarize_shifts
 
-    print_blocks(build_quality_tables(found.shifts))
+    yield from build_quality_tables(found.shifts)
     if len(found.shifts) > 1:
-        print_blocks(build_summary_tables(summarize_shifts(found.shifts)).values())
-    for closing in closings:
-        text = f"; {closing.warning}" if closing.warning else ""
-        print_paragraph(
-            f"converter lock-up at {_format_spread(closing.time, closing.sigma)} s (95 %){text}"
-        )
+        yield from build_summary_tables(summarize_shifts(found.shifts)).values()
+    lock_ups = (
+        f"converter lock-up at {_format_spread(one.time, one.sigma)} s (95 %)"
+        + (f"; {one.warning}" if one.warning else "")
+        for one in closings
+    )
+    yield from make_notes("Converter", lock_ups)
     if seen.gears:
-        print_blocks([_build_gear_table(seen.gears)])
-    for gear in seen.gears:
-        if gear.reason:
-            print_paragraph(f"gear {gear.gear}: {gear.reason}")
-    _print_resonances(seen)
-    _print_remarks(found)
+        yield _build_gear_table(seen.gears)
+    reasons = (f"gear {gear.gear}: {gear.reason}" for gear in seen.gears if gear.reason)
+    yield from make_notes("Gears without an inertia", reasons)
+    yield from make_notes("Resonance after the shifts", _list_resonances(seen))
+    yield from make_notes("Remarks on shifts", _list_remarks(found))
 
 
-def _print_resonances(seen: _SpeedResults) -> None:
-    """Print the resonances found, and each reason for which there is none once."""
+def _list_resonances(seen: _SpeedResults) -> Iterator[str]:
+    """Yield the resonances found, and each reason for which there is none once."""
     refused: dict[str, list[str]] = {}
     for shift, swing in seen.swings:
         if isinstance(swing, str):
             refused.setdefault(swing, []).append(shift.name)
         else:
-            print_paragraph(f"{shift.name}: {_describe_resonance(swing)}")
+            yield f"{shift.name}: {_describe_resonance(swing)}"
     for reason, labels in refused.items():
         names = ", ".join(dict.fromkeys(labels))
         count = f" ({len(labels)} shifts)" if len(labels) > 1 else ""
-        print_paragraph(f"{names}{count}: {reason}")
+        yield f"{names}{count}: {reason}"
 
 
-def _print_remarks(found: FoundShifts) -> None:
-    """Print each kind of finding and each reason of rejection once, with their number."""
+def _list_remarks(found: FoundShifts) -> Iterator[str]:
+    """Yield each kind of finding and each reason of rejection once, with their number."""
     from drivetwin.shifts.summary import collect_findings, collect_rejected
 
     for finding, labels in collect_findings(found.shifts):
         names = ", ".join(dict.fromkeys(labels))
         more = f" ({len(labels)} shifts: {names})" if len(labels) > 1 else ""
-        print_paragraph(f"{finding.severity}: {finding.set_subject(labels[0]).text}{more}")
+        yield f"{finding.severity}: {finding.set_subject(labels[0]).text}{more}"
     for candidate, count in collect_rejected(found.rejected):
         start, end = candidate.time
         more = f" (first of {count} for this reason)" if count > 1 else ""
-        print_paragraph(f"rejected, {start:z.3f} s to {end:z.3f} s: {candidate.reason}{more}")
+        yield f"rejected, {start:z.3f} s to {end:z.3f} s: {candidate.reason}{more}"
 
 
 def _describe_resonance(swing: Resonance) -> str:
@@ -267,3 +256,43 @@ def _build_gear_table(gears: Sequence[HeldGear]) -> TableBlock:
         *(("value", "s"), ("± 95 %", "s"), "verdict"),
     )
     return make_table("Total inertia over η at the output shaft, kg·m²", columns, rows)
+
+
+def show_bus_shifts(log: Path, vehicle: Path, channels: Path | None) -> Outcome:
+    """Read a bus log; return its shifts with phases and findings.
+
+    Raises the typed errors of the readers.
+    """
+    from drivetwin.bus.identify import find_shifts
+    from drivetwin.files.bus_file import build_shift_record
+    from drivetwin.files.records import dump_findings
+    from drivetwin.logs.read import read_log
+    from drivetwin.report.bus import build_phase_table
+    from drivetwin.report.sections.findings import build_findings_section
+    from drivetwin.vehicle.ratio_card import load_ratio_card
+
+    card = load_ratio_card(vehicle)
+    with show_step(f"reading {log.name}"):
+        recording = read_log(log, None, find_mapping(channels, log))
+        found, remarks = find_shifts(recording, card)
+    findings = (*recording.findings, *remarks)
+    held = ", ".join(dict.fromkeys(one.gear for one in found.held))
+    none = TextBlock(f"no gear shift; gear held: {held or 'none'}")
+    shifts = [build_shift_record(found.log.label, one).to_document() for one in found.shifts]
+    return Outcome(
+        [
+            build_phase_table([found]) if found.shifts else none,
+            *build_findings_section(findings).blocks,
+        ],
+        {"shifts": shifts, "findings": dump_findings(findings)},
+    )
+
+
+def refuse_quality(vehicle: Path, key: str) -> InputError:
+    """Return the error of an option that needs figures of shift quality."""
+    return InputError(
+        "a card of the ratios alone gives shifts and phases, but no figures of shift quality",
+        "leave this out, or give a whole vehicle card; 'drivetwin identify' writes a report of bus "
+        "logs",
+        Where(file=str(vehicle), key=key),
+    )

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from drivetwin._util.outputs import LOG_ENDINGS
 from drivetwin._util.request import Request, option, output_file
 from drivetwin.cli.atomic_outputs import write_atomically, write_texts
-from drivetwin.cli.output import print_json, print_line, show_step
+from drivetwin.cli.output import show_step
 from drivetwin.dyno.names import ScenarioName
+from drivetwin.report.outcome import Outcome
 from drivetwin.vehicle.effects import EffectId
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Synthesize(Bench, command="synth"):
     )
 
 
-def synth(request: Synthesize, *, as_json: bool) -> None:
+def synth(request: Synthesize) -> Outcome:
     """Make a shift log with known truth on the virtual dynamometer.
 
     Also write the truth NAME.truth.json and the vehicle card NAME.card.toml. With a model the log
@@ -73,11 +74,7 @@ def synth(request: Synthesize, *, as_json: bool) -> None:
     write = _write_scenario_log if request.model is None else _write_model_log
     with show_step(f"running {request.model or request.scenario}"):
         files = write(request)
-    if as_json:
-        print_json(files)
-        return
-    for path in files.values():
-        print_line(f"wrote {path}")
+    return Outcome(document=files, files=tuple(files.values()))
 
 
 def _write_scenario_log(request: Synthesize) -> dict[str, Path]:

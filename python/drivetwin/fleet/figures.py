@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivetwin._util.display_units import get_display_unit
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fleet.mixed_model.mixed import FloatArray
-from drivetwin.fleet.mixed_model.result import Drift, JointEstimate, UnitValue
-from drivetwin.fleet.rules import format_reading, is_date, to_datetime
+from drivetwin.fleet.mixed_model.result import Drift, JointEstimate
+from drivetwin.fleet.rules import is_date, to_datetime
 from drivetwin.report.figure import Figure
 from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.style import (
@@ -19,7 +18,6 @@ from drivetwin.report.style import (
     FITTED,
     MEASURED,
     MUTED,
-    SECOND,
     make_axis,
     make_layout,
 )
@@ -28,20 +26,18 @@ _MOST_POINTS = 4000
 
 
 def plot_drift(one: JointEstimate) -> Figure:
-    """Every log over the first field, with the shared line, its 95 % band, changes and outliers.
+    """Every log over the first field, with the shared line, its 95 % band, and outliers.
 
     Of very many logs every n-th is drawn.
     """
     display = get_display_unit(one.si_unit)
     drift, points = one.drifts[0], one.points
     out = np.isin(points.value, [outlier.value for outlier in one.outliers])
-    after = _mask_after_change(one) & ~out
     stride = -(-points.value.size // _MOST_POINTS)
     kept = np.arange(0, points.value.size, stride)
     figure = Figure()
     for name, picked, colour, symbol in (
-        ("log", kept[~(out | after)[kept]], MEASURED, "circle"),
-        ("unit that changed, from there", kept[after[kept]], SECOND, "circle"),
+        ("log", kept[~out[kept]], MEASURED, "circle"),
         ("outlier", np.flatnonzero(out), ACCENT, "x"),
     ):
         if picked.size:
@@ -56,9 +52,6 @@ def plot_drift(one: JointEstimate) -> Figure:
                 hovertemplate="unit %{text}: %{y:.4g}<extra></extra>",
             )  # fmt: skip
     _add_line(figure, one, drift)
-    for change in one.changes:
-        place = _convert_readings(drift.field, np.array([0.5 * (change.before + change.after)]))[0]
-        figure.add_vline(x=place, line={"color": SECOND, "width": 1.5, "dash": "dash"})
     figure.merge_layout(
         **make_layout(
             380,
@@ -70,14 +63,6 @@ def plot_drift(one: JointEstimate) -> Figure:
         )
     )
     return figure
-
-
-def _mask_after_change(one: JointEstimate) -> NDArray[np.bool_]:
-    """Return the mask of points that belong to a changed unit after its change."""
-    units, found = np.array(one.points.unit), np.zeros(one.points.value.size, np.bool_)
-    for change in one.changes:
-        found |= (units == change.unit) & (one.points.reading >= change.after)
-    return found
 
 
 def _add_line(figure: Figure, one: JointEstimate, drift: Drift) -> None:
@@ -126,14 +111,14 @@ def plot_units(one: JointEstimate) -> Figure:
                 "thickness": 1,
                 "width": 0,
             },
-            text=[format_unit(one, unit) for _, unit in picked],
+            text=[unit.unit for _, unit in picked],
             mode="markers",
             name=name,
             marker={"color": colour, "size": 6},
             hovertemplate="unit %{text}: %{y:.3g}<extra></extra>",
         )
     few = len(units) <= 80
-    ticks = [format_unit(one, unit) for unit in units] if few else None
+    ticks = [unit.unit for unit in units] if few else None
     figure.merge_layout(
         **make_layout(
             340,
@@ -152,13 +137,6 @@ def plot_units(one: JointEstimate) -> Figure:
         )
     )
     return figure
-
-
-def format_unit(one: JointEstimate, unit: UnitValue) -> str:
-    """Format the label of a unit, before or after a change."""
-    if unit.since is None:
-        return unit.unit
-    return f"{unit.unit} from {format_reading(one.drifts[0].field, unit.since)}"
 
 
 def _convert_readings(

@@ -18,7 +18,15 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
-from drivetwin.errors import FileFormatError, InputError, MissingChannelError, StoreError, Where
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import (
+    DrivetwinError,
+    FileFormatError,
+    InputError,
+    MissingChannelError,
+    StoreError,
+    Where,
+)
 from drivetwin.estimation.direct.friction_law import P0, evaluate_stribeck
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.fit import invert_information
@@ -27,24 +35,28 @@ from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.estimation.result.prior_conflict import remove_prior
 from drivetwin.estimation.result.verdict import assess, reject_identified
-from drivetwin.fleet.members import identify_members
+from drivetwin.fleet.pages import save_vehicle
 from drivetwin.fleet.parts import convert_write_errors
 from drivetwin.fleet.rows import MU, Found, Row, RowKind, make_estimate_row
 from drivetwin.fleet.scan import compute_input_hashes
+from drivetwin.fleet.sources import name_members
 from drivetwin.fleet.task import ShiftRow, Task, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.open_mapped import NOTHING_STATED
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.pipeline import identify
+from drivetwin.report.bus import BusOutcome, identify_vehicle
 from drivetwin.shifts.detect import FoundShifts, require_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.ratio_card import load_ratio_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
+
 
 _LAW_SIZE = P0
 
@@ -310,3 +322,49 @@ def _make_fit_rows(found: Identification) -> Iterator[Row]:
             for figure, value in vars(fit).items():
                 number = float(value) if np.isfinite(value) else None
                 yield Row(RowKind.FIT, f"{signal}.{phase}.{figure}", number)
+
+
+def identify_members(task: Task, mapping: Path | None) -> Found:
+    """Identify a vehicle from its bus logs, and write its report where one is wanted.
+
+    A log that cannot be read is left out with a warning. Raises the error of the last one if none
+    can be read, FileFormatError for a log that changed, StoreError where the report cannot be
+    written, OSError where the drive fails that a log is on.
+    """
+    names = name_members([path for path, _ in task.members])
+    logs: list[ShiftLog] = []
+    rows: list[Row] = []
+    for (path, content), name in zip(task.members, names, strict=True):
+        try:
+            log = read_log(Path(path), None, mapping or NOTHING_STATED)
+        except DrivetwinError as error:
+            if len(rows) + 1 == len(task.members):
+                raise
+            text = f"{name} is left out: {error.what}"
+            rows.append(Row(RowKind.WARNING, "", reason=text))
+            continue
+        if log.sha256 != content:
+            raise FileFormatError(
+                "the file changed while the fleet was at work",
+                "run the same command again when it is complete",
+                Where(file=path),
+            )
+        logs.append(replace(log, source=name))
+    outcome = identify_vehicle(logs, load_ratio_card(Path(task.recipe.vehicle)))
+    if task.report is not None:
+        with convert_write_errors():
+            save_vehicle(Path(task.report), outcome)
+    return Found([*_make_rows(outcome), *rows], list(_make_shift_rows(outcome)))
+
+
+def _make_rows(outcome: BusOutcome) -> Iterator[Row]:
+    """Yield the rows of all estimates and findings."""
+    yield from map(make_estimate_row, outcome.found.estimates.values())
+    for one in (*outcome.remarks, *outcome.found.findings):
+        yield Row(RowKind.WARNING, one.code.value, reason=one.text)
+
+
+def _make_shift_rows(outcome: BusOutcome) -> Iterator[ShiftRow]:
+    for shift in outcome.found.shifts:
+        span = shift.phases[0][1][0], shift.phases[-1][1][1]
+        yield ShiftRow(True, *span, start_gear=shift.start_gear, end_gear=shift.end_gear)

@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification
-from drivetwin.report.bus_outcome import BusOutcome
+from drivetwin.report.bus import BusOutcome
 from drivetwin.report.html import render_report, save_library
 
 LIBRARY = "plotly.js"

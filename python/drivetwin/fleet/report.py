@@ -14,9 +14,9 @@ import numpy as np
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
-from drivetwin.bus.quantities import METHOD as BUS_METHOD
+from drivetwin.bus.scatter import METHOD as BUS_METHOD
 from drivetwin.estimation.result.estimate import Z95, Verdict
-from drivetwin.fleet.figures import format_unit, plot_drift, plot_units
+from drivetwin.fleet.figures import plot_drift, plot_units
 from drivetwin.fleet.friction import compute_fleet_friction
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
 from drivetwin.fleet.mixed_model.observations import collect_facts
@@ -284,9 +284,6 @@ def build_ageing_section(found: Sequence[JointEstimate]) -> Section:
         name = get_parameter_label(one.parameter) + (f" of {one.rule}" if several else "")
         if one.drifts:
             text = f"{name}: every log; the shared line with its 95 % band."
-            if one.changes:
-                units = ", ".join(dict.fromkeys(change.unit for change in one.changes))
-                text += f" Dashed: unit {units} changed there."
             blocks.append(FigureBlock(plot_drift(one), text))
         if _get_significant_spread(one) or any(unit.odd for unit in one.units):
             text = f"{name}: how far each unit is from the shared value, with 95 % intervals."
@@ -306,23 +303,11 @@ def _compute_relative_effect(one: JointEstimate) -> float:
 
 
 def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
-    """Changes of units, units beyond chance, logs that do not fit."""
+    """Build the units beyond chance, and the logs that do not fit."""
     blocks: list[Block] = []
-    changes = [
-        (
-            *(change.unit, make_parameter_cell(one.parameter)),
-            "between " + format_span(change.field, change.before, change.after),
-            _format_deviation(one, change.size, change.std),
-        )
-        for one in found
-        for change in one.changes
-    ]
-    if changes:
-        heads = ("unit", "parameter", "where", "step ± 95 %")
-        blocks.append(make_table("Units that changed, as after a repair.", heads, changes))
     units = [
         (
-            *(format_unit(one, unit), make_parameter_cell(one.parameter)),
+            *(unit.unit, make_parameter_cell(one.parameter)),
             *(_format_deviation(one, unit.deviation, unit.std), unit.score),
         )
         for one in found
@@ -348,10 +333,7 @@ def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder:
         caption = f"Logs that do not fit{make_truncation_caption(len(logs))}."
         named = ("log", "parameter", "value", "expected", "reason")
         blocks.append(make_table(caption, named, logs[:MOST_ROWS]))
-    intro = (
-        "Logs that do not fit are left out of the shared values above; a unit that changed counts "
-        "as another one from there on."
-    )
+    intro = "Logs that do not fit are left out of the shared values above."
     return Section("odd", "Outliers", intro, blocks)
 
 

@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from drivetwin._util.display_units import RPM, format_uncertainty
 from drivetwin.bus.decay import DecayPrediction, JointDecay
-from drivetwin.bus.identify import BusIdentification
+from drivetwin.bus.identify import BusIdentification, identify_bus
 from drivetwin.bus.phases import Timeline
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
+from drivetwin.files.bus_file import BusFile, build_bus_file
 from drivetwin.findings import Code, Finding, explain
 from drivetwin.report.blocks import (
     Block,
@@ -32,6 +36,7 @@ from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import BAND, MEASURED, OVER, SIMULATED, UNDER
+from drivetwin.vehicle.ratio_card import RatioCard
 
 _HEIGHT = 130
 """Height of a panel [px]."""
@@ -39,85 +44,115 @@ _SHOWN = 8
 """Decays of a gear in a figure [count]."""
 
 
-def render_bus(
-    found: BusIdentification,
-    logs: Sequence[str],
-    remarks: Sequence[Finding] = (),
-    library: str | None = None,
-) -> str:
-    """HTML text of the page, with plotly.js inside or in the file `library`."""
-    title = f"Bus logs: {', '.join(logs)}"
-    subtitle = f"{len(logs)} logs · {len(found.shifts)} shifts"
-    return render_page(title, subtitle, build_bus_sections(found, remarks), library)
+@dataclass(frozen=True, eq=False)
+class BusOutcome:
+    """Result of the bus logs of one vehicle with the names of the logs and the reader's remarks."""
+
+    logs: tuple[str, ...]
+    found: BusIdentification
+    remarks: tuple[Finding, ...]
+
+    @property
+    def verdict(self) -> VerdictBlock:
+        """Verdict on the quantities."""
+        inside = [one.share_inside for one in self.found.predictions.values()]
+        return explain_bus(self.found.estimates, self.found.findings, inside)
+
+    def build_file(self, settings: Mapping[str, str] | None = None) -> BusFile:
+        """Build the result file with the settings of the run."""
+        return build_bus_file(self.found, self.logs, self.remarks, settings)
+
+    def build_blocks(self) -> list[Block]:
+        """Build verdict, quantities, shifts with phases, decays, predictions, and findings."""
+        found = self.found
+        return [
+            self.verdict,
+            *_build_parameters(found),
+            build_phase_table(found.timelines),
+            *_build_energies(found),
+            *_build_loads(found),
+            *_build_decay_tables(found),
+            *_build_prediction_table(found),
+            *build_findings_section((*self.remarks, *found.findings)).blocks,
+        ]
+
+    def build_sections(self) -> list[Section]:
+        """Build the sections of report and workbench."""
+        found = self.found
+        sections = [
+            Section(
+                "result",
+                "Result",
+                "",
+                [self.verdict, _build_tiles(found), *_build_parameters(found)],
+            ),
+            build_findings_section((*self.remarks, *found.findings)),
+            Section(
+                "shifts",
+                "Shifts",
+                "Phases from the ratio of the speeds and, where recorded, the slip of the clutch.",
+                [build_phase_table(found.timelines), *_build_energies(found)],
+            ),
+            Section(
+                "road-load",
+                "Road load",
+                "Load at the gearbox output over the efficiency while a gear is held: torque "
+                "message less inertia times acceleration.",
+                list(_build_loads(found)),
+            ),
+            Section(
+                "decays",
+                "Decays after lock-up",
+                "Input speed of each decay, and oscillation with common frequency and damping.",
+                [*_build_decays(found), *_build_decay_tables(found)],
+            ),
+            Section(
+                "predictions",
+                "Held-out decays",
+                "The first period gives amplitude, phase and trend; later samples are predicted.",
+                [*_build_predictions(found), *_build_prediction_table(found)],
+            ),
+        ]
+        return [one for one in sections if one.blocks]
+
+    def render(self, library: str | None = None) -> str:
+        """Render the report as HTML, with plotly.js inside or in the file `library`."""
+        title = f"Bus logs: {', '.join(self.logs)}"
+        subtitle = f"{len(self.logs)} logs · {len(self.found.shifts)} shifts"
+        return render_page(title, subtitle, self.build_sections(), library)
 
 
-def build_bus_sections(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Section]:
-    """Build the sections of a result: quantities, findings, shifts, decays, predictions."""
-    verdict = explain_bus_identification(found).block
-    sections = [
-        Section(
-            "result",
-            "Result",
-            "",
-            [verdict, _build_tiles(found), *_build_parameters(found)],
-        ),
-        build_findings_section((*remarks, *found.findings)),
-        Section(
-            "shifts",
-            "Shifts",
-            "Phases from the ratio of the speeds and the slip of the clutch, where it is recorded.",
-            [build_phase_table(found.timelines), *_build_energies(found)],
-        ),
-        Section(
-            "road-load",
-            "Road load",
-            "Load at the gearbox output over the efficiency while a gear is held, from the torque "
-            "message less inertia times acceleration.",
-            list(_build_loads(found)),
-        ),
-        Section(
-            "decays",
-            "Decays after lock-up",
-            "Input speed of each decay, and the oscillation with the common frequency and damping.",
-            [*_build_decays(found), *_build_decay_tables(found)],
-        ),
-        Section(
-            "predictions",
-            "Held-out decays",
-            "The first period gives amplitude, phase and trend; all later samples are predicted.",
-            [*_build_predictions(found), *_build_prediction_table(found)],
-        ),
-    ]
-    return [one for one in sections if one.blocks]
+def identify_vehicle(
+    logs: Sequence[ShiftLog], card: RatioCard | None, held: Collection[int] = ()
+) -> BusOutcome:
+    """Identify one vehicle from its bus logs.
 
+    Parameters
+    ----------
+    logs : logs of the vehicle
+    card : ratios of the gears; None to take them from the speeds
+    held : indices of the logs whose decays are predicted by the others
 
-def build_bus_blocks(found: BusIdentification, remarks: Sequence[Finding] = ()) -> list[Block]:
-    """Verdict, quantities, shifts with phases, decays, predictions, and findings."""
-    return [
-        explain_bus_identification(found).block,
-        *_build_parameters(found),
-        build_phase_table(found.timelines),
-        *_build_energies(found),
-        *_build_loads(found),
-        *_build_decay_tables(found),
-        *_build_prediction_table(found),
-        *build_findings_section((*remarks, *found.findings)).blocks,
-    ]
-
-
-@dataclass(frozen=True)
-class BusVerdict:
-    """Verdict on the quantities of bus logs; it is confirmed if some are identified and no shift
-    contradicts the others."""
-
-    block: VerdictBlock
-    is_confirmed: bool
+    Raises
+    ------
+    InputError
+        If no log is left to identify.
+    NoShiftError
+        If no gear is held for long enough.
+    """
+    fitted = [log for k, log in enumerate(logs) if k not in held]
+    if not fitted:
+        raise InputError("all logs are held out", "leave at least one to identify")
+    found = identify_bus(fitted, card, [log for k, log in enumerate(logs) if k in held])
+    remarks = tuple(dict.fromkeys(one for log in logs for one in log.findings))
+    return BusOutcome(tuple(Path(log.source).name for log in logs), found, remarks)
 
 
 def explain_bus(
     estimates: Mapping[str, Estimate], findings: Sequence[Finding], inside: Sequence[float]
-) -> BusVerdict:
-    """Explain a result; `inside` are the shares of predicted samples inside the 95 % band."""
+) -> VerdictBlock:
+    """Build the verdict on a result, good if some quantities are identified and no shift
+    contradicts the others; `inside` are the shares of predicted samples inside the 95 % band."""
     verdicts = [one.verdict for one in estimates.values()]
     count = verdicts.count(Verdict.IDENTIFIED)
     status = f"{count} of {len(verdicts)} quantities identified"
@@ -133,13 +168,7 @@ def explain_bus(
             f" {len(inside)} held-out decays were predicted: {100.0 * float(np.mean(inside)):.0f} "
             "% of their samples are inside the 95 % band."
         )
-    return BusVerdict(VerdictBlock(status, reason, action, tone, "Bus logs"), tone is Tone.GOOD)
-
-
-def explain_bus_identification(found: BusIdentification) -> BusVerdict:
-    """Explain the result of an identification."""
-    inside = [one.share_inside for one in found.predictions.values()]
-    return explain_bus(found.estimates, found.findings, inside)
+    return VerdictBlock(status, reason, action, tone, "Bus logs")
 
 
 def _explain_agreement(estimates: Mapping[str, Estimate], count: int) -> tuple[str, str, Tone]:

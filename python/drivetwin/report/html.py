@@ -33,14 +33,14 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification, Several
 from drivetwin.report.blocks import Block, FigureBlock, Section
 from drivetwin.report.figure import Entry, encode_entries
-from drivetwin.report.sections.actuators import build_actuator_section
 from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.parameters import build_result_section
-from drivetwin.report.sections.provenance import build_provenance_section
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.report.sections.summary import (
+    build_actuator_section,
     build_friction_section,
+    build_provenance_section,
     build_shift_section,
     build_validation_section,
 )

@@ -19,7 +19,7 @@ class Outcome:
     `blocks` are for people, `lines` below them are never wrapped; `document` is for programs;
     `files` were written. `is_confirmed` is false
     for a result that `--strict` refuses. `fault` is the error of a part, beside which the rest was
-    done.
+    done. `is_json` is true where the document is the result for people too.
     """
 
     blocks: Sequence[Block] = ()
@@ -28,3 +28,4 @@ class Outcome:
     is_confirmed: bool = True
     fault: DrivetwinError | None = None
     lines: Sequence[str] = ()
+    is_json: bool = False

@@ -110,7 +110,7 @@ class MadeResult:
             case BusFile() as bus:
                 findings = [one.to_finding() for one in bus.findings]
                 inside = [one.inside for one in bus.predictions]
-                return explain_bus(self.estimates, findings, inside).block
+                return explain_bus(self.estimates, findings, inside)
             case content:
                 return build_verdict_block(explain_result(content))
 

@@ -14,7 +14,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.export.targets import Target
 from drivetwin.export.write import ExportedModel, ExportOptions, write_export
 from drivetwin.files.twin_file import save_twin
-from drivetwin.report.bus_outcome import BusOutcome
+from drivetwin.report.bus import BusOutcome
 from drivetwin.workbench import jobs, what_if
 from drivetwin.workbench.identifying import render_bus_report, render_log_report
 from drivetwin.workbench.session_state import SessionState

@@ -12,7 +12,7 @@ from drivetwin.estimation.analysis.experiment_design import rank_for_weak
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
-from drivetwin.report.bus_outcome import BusOutcome, identify_vehicle
+from drivetwin.report.bus import BusOutcome, identify_vehicle
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.multi_log import Source, identify_together
 from drivetwin.vehicle.card import VehicleCard

@@ -10,7 +10,7 @@ from pathlib import Path
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.report.bus_outcome import BusOutcome
+from drivetwin.report.bus import BusOutcome
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Mixed model of a fleet: shared values, units, ageing, changes, outliers."""
+"""Mixed model of a fleet: shared values, units, ageing, outliers."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joint estimates of a store: shared values with units' deviations, ageing, changes, outliers."""
+"""Joint estimates of a store: shared values with units' deviations, ageing, outliers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from drivetwin.fleet.mixed_model.change_points import Step, find_steps
 from drivetwin.fleet.mixed_model.mixed import (
     FloatArray,
     IntArray,
@@ -26,7 +25,6 @@ from drivetwin.fleet.mixed_model.observations import (
 )
 from drivetwin.fleet.mixed_model.reasons import attach_reasons
 from drivetwin.fleet.mixed_model.result import (
-    Change,
     Drift,
     JointEstimate,
     Outlier,
@@ -118,29 +116,20 @@ def estimate_parameter(seen: Observed, known: Mapping[str, LogFacts]) -> JointEs
     if data is None:
         return None
     sound = select_plausible(data.value, data.unit)
-    first = _fit(data, data.unit, sound)
+    first = _fit(data, sound)
     if first is None:
         return None
-    steps = _find_unit_changes(data, first, sound)
-    group, since = _assign_groups(data, steps)
-    found, sound = _fit_rejecting_outliers(data, group, sound)
+    found, sound = _fit_rejecting_outliers(data, sound)
     if found is None:
         return None
-    return _assemble_estimate(seen, known, _FitBasis(data, steps, group, since, found, sound))
+    return _assemble_estimate(seen, known, _FitBasis(data, found, sound))
 
 
 @dataclass(frozen=True, eq=False)
 class _FitBasis:
-    """Basis of the conclusions.
-
-    The groups are units; a unit is divided at a step, which lies at the reading `since`. `sound`
-    (n,) is the mask of the logs that took part.
-    """
+    """Basis of the conclusions; `sound` (n,) is the mask of the logs that took part."""
 
     data: _Data
-    steps: list[Step]
-    group: IntArray
-    since: tuple[float | None, ...]
     fit: MixedFit
     sound: Mask
 
@@ -189,8 +178,9 @@ def _select_usable_fields(
     return used, tuple(notes)
 
 
-def _fit(data: _Data, group: IntArray, sound: Mask, *, intervals: bool = False) -> MixedFit | None:
+def _fit(data: _Data, sound: Mask, *, intervals: bool = False) -> MixedFit | None:
     """Fit over the sound logs; residuals and variances of all. None with too few logs."""
+    group = data.unit
     x, z = data.make_design(group)
     kept = np.flatnonzero(sound)
     present, inverse = np.unique(group[kept], return_inverse=True)
@@ -215,33 +205,10 @@ def _fit(data: _Data, group: IntArray, sound: Mask, *, intervals: bool = False) 
     )
 
 
-def _find_unit_changes(data: _Data, first: MixedFit, sound: Mask) -> list[Step]:
-    """Changes of units over the first field."""
-    if not data.fields:
-        return []
-    kept = np.flatnonzero(sound)
-    x, _ = data.make_design(data.unit)
-    left = data.value - x @ first.beta
-    return find_steps(data.unit[kept], data.readings[kept, 0], left[kept], first.variance[kept])
-
-
-def _assign_groups(data: _Data, steps: Sequence[Step]) -> tuple[IntArray, tuple[float | None, ...]]:
-    """Units as groups (n,); a unit that changed is a new one from there on."""
-    group = data.unit.copy()
-    since: list[float | None] = [None] * len(data.names)
-    for step in steps:
-        later = (data.unit == step.unit) & (data.readings[:, 0] >= step.after)
-        group[later] = len(since)
-        since.append(step.after)
-    return group, tuple(since)
-
-
-def _fit_rejecting_outliers(
-    data: _Data, group: IntArray, sound: Mask
-) -> tuple[MixedFit | None, Mask]:
+def _fit_rejecting_outliers(data: _Data, sound: Mask) -> tuple[MixedFit | None, Mask]:
     """Fit, leave out what does not fit, and again until nothing changes."""
     bound = compute_outlier_limit(data.value.size)
-    found = _fit(data, group, sound)
+    found = _fit(data, sound)
     for _ in range(_ROUNDS):
         if found is None:
             break
@@ -249,8 +216,8 @@ def _fit_rejecting_outliers(
         if np.array_equal(fits, sound):
             break
         sound = fits
-        found = _fit(data, group, sound)
-    return _fit(data, group, sound, intervals=True), sound
+        found = _fit(data, sound)
+    return _fit(data, sound, intervals=True), sound
 
 
 def _assemble_estimate(
@@ -272,10 +239,6 @@ def _assemble_estimate(
         excess=found.excess,
         drifts=_collect_drifts(data, found),
         units=_collect_units(end),
-        changes=tuple(
-            Change(data.names[s.unit], data.fields[0], s.before, s.after, s.size, s.std)
-            for s in end.steps
-        ),
         outliers=_collect_outliers(end, known),
         notes=data.notes,
         points=Points(
@@ -307,24 +270,22 @@ def _collect_drifts(data: _Data, found: MixedFit) -> tuple[Drift, ...]:
 
 
 def _collect_units(end: _FitBasis) -> tuple[UnitValue, ...]:
-    """Collect the deviations of the units, before and after changes."""
+    """Collect the deviations of the units."""
     if not end.fit.sigma.size:
         return ()
-    deviation = end.fit.deviation[:, 0]
+    deviation, unit = end.fit.deviation[:, 0], end.data.unit
     scores = compute_unit_scores(deviation)
     bound = compute_unit_limit(deviation.size)
-    owner = {int(g): int(u) for g, u in zip(end.group, end.data.unit, strict=True)}
     return tuple(
         UnitValue(
-            unit=end.data.names[owner[g]],
-            logs=int(np.sum((end.group == g) & end.sound)),
-            deviation=float(deviation[g]),
-            std=float(end.fit.deviation_std[g, 0]),
-            since=end.since[g],
-            score=float(scores[g]) if np.isfinite(scores[g]) else None,
-            odd=bool(abs(scores[g]) > bound),
+            unit=name,
+            logs=int(np.sum((unit == k) & end.sound)),
+            deviation=float(deviation[k]),
+            std=float(end.fit.deviation_std[k, 0]),
+            score=float(scores[k]) if np.isfinite(scores[k]) else None,
+            odd=bool(abs(scores[k]) > bound),
         )
-        for g in sorted(owner)
+        for k, name in enumerate(end.data.names)
     )
 
 

@@ -28,29 +28,16 @@ class Drift:
 class UnitValue:
     """Deviation of a unit from the shared value, and its standard error.
 
-    `since` is the field's reading at which the unit changed, None before any change. `score` is the
-    deviation in robust standard deviations of all units; `odd` is true if it is significant.
+    `score` is the deviation in robust standard deviations of all units; `odd` is true if it is
+    significant.
     """
 
     unit: str
     logs: int
     deviation: float
     std: float
-    since: float | None
     score: float | None
     odd: bool
-
-
-@dataclass(frozen=True)
-class Change:
-    """A unit's values are larger by `size` ± `std` after the reading `before` of a field."""
-
-    unit: str
-    field: str
-    before: float
-    after: float
-    size: float
-    std: float
 
 
 @dataclass(frozen=True)
@@ -101,7 +88,6 @@ class JointEstimate:
     excess: float
     drifts: tuple[Drift, ...]
     units: tuple[UnitValue, ...]
-    changes: tuple[Change, ...]
     outliers: tuple[Outlier, ...]
     notes: tuple[str, ...]
     points: Points

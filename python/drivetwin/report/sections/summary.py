@@ -4,15 +4,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isinf
 
-from drivetwin._util.display_units import format_significant, format_uncertainty, format_with_unit
+from drivetwin._util.display_units import (
+    BAR,
+    NM,
+    RAD_PER_S,
+    RPM,
+    Display,
+    format_significant,
+    format_uncertainty,
+    format_with_unit,
+)
+from drivetwin._util.version import get_program_version
+from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
+from drivetwin.actuator.model import QUANTITIES, ActuatorQuantity
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.estimation.identification import Identification
+from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.findings import render
 from drivetwin.report.blocks import (
     Block,
+    Cell,
     FigureBlock,
     Section,
     TableBlock,
@@ -32,6 +46,7 @@ from drivetwin.report.figures.validation import (
 )
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.twin.build import list_borrowed_friction
 from drivetwin.validation.simulate_log import EXTRA_SIGNALS, SIGNALS, pool_fits
 from drivetwin.vehicle.shift_kind import ShiftKind
 
@@ -212,3 +227,73 @@ def build_friction_table(friction: Mapping[str, FrictionCurve]) -> TableBlock:
             first = ("", "")
     columns = ("element", ("slip [rad/s]", "z.1f"), ("μ", "s"), ("± 95 %", "s"), "verdict")
     return make_table("Friction, for the gains on the vehicle card", columns, rows)
+
+
+_RANGES: dict[str, tuple[str, Display]] = {
+    "slip": ("slip", RAD_PER_S),
+    "pressure": ("pressure", BAR),
+    "torque": ("engine torque", NM),
+    "speed": ("engine speed", RPM),
+    OIL_TEMPERATURE: ("oil temperature", Display("K")),
+}
+
+
+def build_provenance_section(found: Identification) -> Section:
+    """Assumptions, range of validity, versions, hashes; the settings are in the result file."""
+    blocks = make_notes("Assumed", (*found.assumptions, *list_borrowed_friction(found)))
+    inputs = make_table("Inputs.", ("file", "SHA-256"), found.inputs.items())
+    blocks += [_build_validity_table(found), inputs]
+    return Section(
+        "provenance",
+        "Assumptions and origin",
+        f"Made with drivetwin {get_program_version()}. All settings are in the result file.",
+        blocks,
+    )
+
+
+def _build_validity_table(found: Identification) -> TableBlock:
+    rows = []
+    for name, ends in found.validity.items():
+        label, display = _RANGES.get(name, (name, Display("SI")))
+        rows.append((label, *(end * display.factor for end in ends), display.label))
+    return make_table(
+        "Range covered by the log; the model is not validated outside it.",
+        ("quantity", ("from", "4"), ("to", "4"), "unit"),
+        rows,
+    )
+
+
+def build_actuator_section(found: Identification) -> Section:
+    """One table of parameters with 95 % intervals for each element whose command is in the log."""
+    blocks = [_build_table(name, one) for name, one in found.actuators.items()]
+    return Section(
+        "actuators",
+        "Actuators",
+        "Commanded to clutch pressure: hysteresis of the valve, dead time, fill of the clutch "
+        "against its spring, second-order lag. The dead time includes that of a "
+        "pressure sensor.",
+        blocks,
+    )
+
+
+def _build_table(name: str, one: IdentifiedActuator) -> TableBlock:
+    values, stds = one.model.values.tolist(), one.std.tolist()
+    rows = [
+        _build_row(spec, value, std)
+        for spec, value, std in zip(QUANTITIES.values(), values, stds, strict=True)
+    ]
+    if one.source is ActuatorSource.TORQUE:
+        caption = f"Actuator of {name}, from command and clutch torque: {one.samples} values, "
+        caption += f"residual {one.rms:.2g} times the noise; usual ranges are priors"
+    else:
+        rms = format_with_unit(one.rms, "Pa", digits=3)
+        caption = f"Actuator of {name}: {one.samples} samples, residual {rms} rms"
+    return make_table(caption, ("parameter", ("value, 95 %", "s")), rows)
+
+
+def _build_row(spec: ActuatorQuantity, value: float, std: float) -> tuple[object, ...]:
+    label = Cell(f"{spec.label} {spec.symbol}", note=spec.meaning)
+    if isinf(std):
+        text = format_with_unit(value, spec.unit, digits=3)
+        return label, Cell(text, number=True, note="assumed, not determined", tone=Tone.UNKNOWN)
+    return label, format_with_unit(value, spec.unit, Z95 * std)

@@ -9,7 +9,7 @@ from pathlib import Path
 import can
 import pytest
 
-from drivetwin.logs.formats.can.blf import read_blf
+from drivetwin.logs.formats.can.open import read_blf
 
 
 def test_frames_without_signals_are_counted(tmp_path: Path) -> None:
