@@ -157,7 +157,6 @@ def find_idle(found: Identification, stages: Mapping[str, float]) -> list[str]:
         Mechanism.LOAD_GROWTH: is_selected and not grows,
         Mechanism.LOAD_TERMS: len(found.shifts) == 1 and not is_restricted,
         Mechanism.FAR_MODES: all(stages.get(one, 0.0) < IDLE for one in far),
-        Mechanism.OTHER_MINIMA: "minima/first refit" not in stages,
         Mechanism.MODE_AVERAGE: "model selection/averaging" not in stages,
         Mechanism.LOWER_GEAR: is_selected,
         Mechanism.ADMISSION: all(one.code is not Code.EFFECT_EXCLUDED for one in found.findings),

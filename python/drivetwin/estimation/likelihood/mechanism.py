@@ -20,7 +20,6 @@ class Mechanism(StrEnum):
     SAMPLING_MODES = "sampling_modes"
     FAR_MODES = "far_modes"
     LOAD_TERMS = "load_terms"
-    OTHER_MINIMA = "other_minima"
     MODE_AVERAGE = "mode_average"
     LOWER_GEAR = "lower_gear"
     ADMISSION = "admission"

@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Table of the candidate models of a log, and their choice by evidence.
+"""Candidate models of a log, and their choice by evidence.
 
-The first fit is that of a dual clutch with a load of each shift that grows with speed. A row of the
-table is a term of this load, which is dropped where the log does not support it, or a refit: from
-another start, or with an element added to the plant. The criterion is the log evidence against the
-model without it (`plants.py`).
+The first fit is that of a dual clutch with a load of each shift that grows with speed. A term of
+this load is dropped where the log does not support it, and an element is added to the plant where
+it does. The criterion is the log evidence against the model without it (`plants.py`).
 
 A term or element that an effect's columns describe is chosen where the log shows it; if it is not,
 the columns move the values or widen the intervals. Without columns, a term is dropped only where
 the log shows its absence, and a refit that is not chosen widens the covariance by the moves that it
 would cause, times its probability.
 
-The other loss law is not a row: both laws differ only while the torque through the gears is
+The other loss law is not among them: both laws differ only while the torque through the gears is
 reversed, so that its minimum is near. One expansion of Q at the minimum of the first predicts place
 and depth (a fit from there agrees within a tenth of a standard deviation).
 """
@@ -19,7 +18,7 @@ and depth (a fit from there agrees within a tenth of a standard deviation).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 
@@ -29,24 +28,18 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import TimedStages
 from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute_term_evidence
-from drivetwin.estimation.likelihood.budget import BudgetExceeded
-from drivetwin.estimation.likelihood.data.input_smoothing import SMOOTHING
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import fit_local
 from drivetwin.estimation.likelihood.parametrization import LOAD_DEVIATION, PLANTS
 from drivetwin.estimation.likelihood.selection.plants import (
     average_over,
     build_plant_priors,
-    compute_evidence,
     list_starts,
     refit_plant,
 )
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
-from drivetwin.estimation.likelihood.slip_contact import SLIPPING, evaluate_contact
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import LEAD, SHOWN, Group
@@ -56,23 +49,16 @@ from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 
-_LINGERS = 0.05
-"""Time [s] that an element must slip about P0: one that just lets go passes in half of it."""
 _STAGES = TimedStages("plant", ("expansion", "first refit", "refit"))
-_SEARCHES = TimedStages("minima", ("first refit", "refit"))
 
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Fit that candidates change.
-
-    `problem` has signals as read; `evidence` is that of the columns of all effects with `priors`.
-    """
+    """Fit of the dual clutch, and the `evidence` of the columns of all effects with `priors`."""
 
     fit: LikelihoodFit
-    problem: ShiftObjective
-    priors: EffectPriors = field(default_factory=EffectPriors)
-    evidence: Mapping[Group, GroupEvidence] = field(default_factory=dict)
+    priors: EffectPriors
+    evidence: Mapping[Group, GroupEvidence]
 
     def find_largest(self, *, other_than: EffectId | None) -> float:
         """Return the largest log evidence of the columns of other effects, at least 0."""
@@ -98,71 +84,41 @@ class Refit:
     moves: FloatArray
 
 
-Propose = Callable[[Basis], list[Callable[[], Refit | None]]]
-"""Proposes searches by the evidence of the basis; each returns None without a minimum."""
-
-
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """Row of the table.
+class LoadTerm:
+    """Term of the load: its unknowns, which `owns` recognises by name, have the prior standard
+    deviation of `compute_std`. `effect` names the columns that describe it where the fit has it
+    not."""
 
-    A term of the load has its unknowns, which `owns` recognises by name, with the prior standard
-    deviation of `compute_std`. A refit is proposed by `propose`. `effect` names the columns that
-    describe the candidate.
-    """
-
+    owns: Callable[[str], bool]
+    compute_std: Callable[[LikelihoodFit], float]
     effect: EffectId | None = None
-    owns: Callable[[str], bool] | None = None
-    compute_std: Callable[[LikelihoodFit], float] | None = None
-    propose: Propose | None = None
-
-    @property
-    def has_columns(self) -> bool:
-        """True where columns at the minimum of the dual clutch describe it."""
-        return self.effect is not None and EFFECTS[self.effect].has_columns
 
     def find_unknowns(self, point: ParameterVector) -> list[int]:
         """Return the numbers of its unknowns."""
-        owns = self.owns or (lambda _: False)
-        return [k for k, name in enumerate(point.names) if owns(name)]
+        return [k for k, name in enumerate(point.names) if self.owns(name)]
 
     def is_supported(self, fit: LikelihoodFit, point: ParameterVector, own: FloatArray) -> bool:
-        """Return whether a log supports a term with the covariance `own` (m, m) at `point`."""
-        assert self.compute_std is not None, "the candidate is a term of the load"
+        """Return whether a log supports the term with the covariance `own` (m, m) at `point`."""
         values = point.values[self.find_unknowns(point)]
         nats = compute_term_evidence(values, own, self.compute_std(fit))
-        return nats > (SHOWN if self.has_columns else -SHOWN)
-
-    def compute_required(self, basis: Basis) -> float:
-        """Compute the log evidence from which a refit is chosen.
-
-        An effect in the plant is named as a cause. It is not chosen where another effect has more
-        evidence, or where its own columns describe it nearly as well: they then move the values as
-        the plant would.
-        """
-        if self.effect is None:
-            return 0.0
-        if basis.get_prior(self.effect).value:
-            return -np.inf
-        own = basis.find_likeliest(self.effect)
-        least = SHOWN + (own.nats if own else 0.0)
-        return max(LEAD, basis.find_largest(other_than=self.effect), least)
+        return nats > (-SHOWN if self.effect is None else SHOWN)
 
 
-def find_absent_terms(fit: LikelihoodFit) -> tuple[list[Candidate], ParameterVector]:
+def find_absent_terms(fit: LikelihoodFit) -> tuple[list[LoadTerm], ParameterVector]:
     """Find the terms of the load that a log does not support.
 
     Returns
     -------
-    list of Candidate
+    list of LoadTerm
         Terms without support; one that the fit does not have is among them.
     ParameterVector
         Unknowns of the fit without those of the terms that are dropped before the last row, to
         first order of the minimum.
     """
-    absent: list[Candidate] = []
+    absent: list[LoadTerm] = []
     point, covariance = fit.point, fit.covariance
-    for row in (one for one in CANDIDATES.values() if one.owns is not None):
+    for row in (LOAD_OF_EACH_SHIFT, GROWING_LOAD):
         if absent:
             point, covariance = _condition(point, covariance, absent[-1].find_unknowns(point))
         own = row.find_unknowns(point)
@@ -183,15 +139,6 @@ def _condition(
     return ParameterVector(names, values), covariance[np.ix_(rest, rest)] - along @ cross.T
 
 
-def try_minima(fit: LikelihoodFit, problem: ShiftObjective) -> LikelihoodFit:
-    """Try other minima about that of a fit. `problem` has signals as read.
-
-    The covariance is widened by minima of similar evidence. Returns `fit` itself where none is
-    proposed.
-    """
-    return _try_refits(Basis(fit, problem), [OTHER_MINIMUM], _SEARCHES)
-
-
 def try_plants(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """Try elements in the plant; `fit` is that of the dual clutch."""
     if not fit.problem.terms[0].scale_known or fit.plant is not None:
@@ -200,53 +147,47 @@ def try_plants(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
         expansion = expand_effects(fit, priors)
     if expansion is None:
         return fit
-    basis = Basis(fit, fit.problem, priors, expansion.evidence)
-    return _try_refits(basis, [CANDIDATES[effect] for effect in PLANTS], _STAGES)
-
-
-def _try_refits(basis: Basis, rows: Sequence[Candidate], stages: TimedStages) -> LikelihoodFit:
-    """Choose the refit with most evidence if that is enough, and average over the others."""
-    found = list(_search(basis, rows, stages))
+    basis = Basis(fit, priors, expansion.evidence)
+    found = dict(_search(basis))
     if not found:
-        return basis.fit
-    row, best = max(found, key=lambda one: one[1].nats)
-    shown = basis.find_largest(other_than=row.effect)
+        return fit
+    effect = max(found, key=lambda one: found[one].nats)
+    if found[effect].nats > _compute_required(basis, effect):
+        return found[effect].fit
+    shown = basis.find_largest(other_than=effect)
     against = float(np.logaddexp(0.0, shown)) if shown > SHOWN else 0.0
-    chosen, others = basis.fit, [one for each, one in found if not each.has_columns]
-    if best.nats > row.compute_required(basis):
-        if best.fit.point.names != basis.fit.point.names:
-            return best.fit
-        origin = Refit(basis.fit, 0.0, np.zeros_like(best.moves))
-        others = [origin, *(one for one in others if one is not best)]
-        chosen, against = best.fit, best.nats
-    size, start = chosen.point.values.size, best.moves if chosen is best.fit else 0.0
-    return average_over(
-        chosen, [((one.moves - start)[:size], one.nats - against) for one in others]
-    )
+    size = fit.point.values.size
+    others = [one for effect, one in found.items() if not EFFECTS[effect].has_columns]
+    return average_over(fit, [(one.moves[:size], one.nats - against) for one in others])
 
 
-def _search(
-    basis: Basis, rows: Sequence[Candidate], stages: TimedStages
-) -> Iterator[tuple[Candidate, Refit]]:
-    """Yield the best refit of each search that ends at a minimum, with its row."""
-    plans = [(row, row.propose(basis)) for row in rows if row.propose is not None]
-    total = sum(len(searches) for _, searches in plans)
-    stages, numbers = stages.repeat("refit", total - 1), count()
-    for row, searches in plans:
+def _compute_required(basis: Basis, effect: EffectId) -> float:
+    """Compute the log evidence from which an effect is put into the plant.
+
+    It is named as a cause. It is not chosen where another effect has more evidence, or where its
+    own columns describe it nearly as well: they then move the values as the plant would.
+    """
+    if basis.get_prior(effect).value:
+        return -np.inf
+    own = basis.find_likeliest(effect)
+    least = SHOWN + (own.nats if own else 0.0)
+    return max(LEAD, basis.find_largest(other_than=effect), least)
+
+
+def _search(basis: Basis) -> Iterator[tuple[EffectId, Refit]]:
+    """Yield the best refit with each effect for which a search ends at a minimum."""
+    plans = {effect: _propose_plant(effect, basis) for effect in PLANTS}
+    total = sum(map(len, plans.values()))
+    stages, numbers = _STAGES.repeat("refit", total - 1), count()
+    for effect, searches in plans.items():
         refits = []
         for search in searches:
             number = next(numbers)
             name = "refit" if number else "first refit"
-            try:
-                with stages.enter(name, number=max(number - 1, 0)):
-                    refits.append(search())
-            except BudgetExceeded:
-                break
-        ended = [one for one in refits if one is not None]
-        if row.effect is None:
-            yield from ((row, one) for one in ended)
-        elif ended:
-            yield row, max(ended, key=lambda one: one.nats)
+            with stages.enter(name, number=max(number - 1, 0)):
+                refits.append(search())
+        if ended := [one for one in refits if one is not None]:
+            yield effect, max(ended, key=lambda one: one.nats)
 
 
 def _propose_plant(effect: EffectId, basis: Basis) -> list[Callable[[], Refit | None]]:
@@ -275,58 +216,6 @@ def _propose_plant(effect: EffectId, basis: Basis) -> list[Callable[[], Refit | 
     return [partial(search, start) for start in starts]
 
 
-def _propose_minima(basis: Basis) -> list[Callable[[], Refit | None]]:
-    """Propose starts from either side of the P0 of each element that lingers about it.
-
-    Held a few kPa above P0 a disengaging element still transmits drag torque; raising P0 slightly
-    removes it, and from there Q has hardly a slope: noise engages and disengages the element, and Q
-    has a minimum on either side. Which minimum a search reaches depends on its start, the design
-    value. Q alone is compared: log|Σ| depends on how often noise engages the element.
-    """
-    fit = basis.fit
-    problem = basis.problem.select_modes(fit.problem.modes)
-
-    def search(start: ParameterVector) -> Refit | None:
-        found = fit_local(problem, start)
-        if found is None:
-            return None
-        moves = found.point.values - fit.point.values
-        return Refit(found, compute_evidence(fit, found, fit.chi2, ()), moves)
-
-    starts: list[Callable[[], Refit | None]] = []
-    for name, away in _find_lingering(fit).items():
-        for side in (-away, away):
-            values = fit.point.values.copy()
-            values[fit.point.names.index(name)] += side
-            starts.append(partial(search, fit.point.replace_values(values)))
-    return starts
-
-
-def _find_lingering(fit: LikelihoodFit) -> dict[str, float]:
-    """Find the P0 of off-going elements that slip about it, by the name of the unknown, each with
-    the noise of a sample of its pressure [Pa]."""
-    found = {}
-    for term in fit.problem.terms:
-        leaving, _ = term.structure.elements
-        name = f"{leaving.name}.P0"
-        if name in fit.point.names and _compute_time_about(term, fit.point, name) > _LINGERS:
-            found[name] = term.record.input_sigma[leaving.name]
-    return found
-
-
-def _compute_time_about(term: ShiftTerm, point: ParameterVector, unknown: str) -> float:
-    """Compute the time [s] for which an element slips at a pressure that noise may lift above the
-    P0 `unknown` or not."""
-    run, name = term.simulate(point), unknown.removesuffix(".P0")
-    if run is None or name not in term.record.pressures:
-        return 0.0
-    contact, signal = evaluate_contact(term, point, run, name), term.record.pressures[name]
-    P0 = term.structure.get_value(point, unknown)
-    away = np.abs(np.interp(contact.middle, signal.time, signal.values) - P0)
-    near = away < SMOOTHING.fill_sigma * term.record.input_sigma[name]
-    return float(np.sum(np.diff(run.time)[near & (np.abs(contact.slip) > SLIPPING)]))
-
-
 def _compute_load_scale(fit: LikelihoodFit) -> float:
     """Compute the root mean square of the loads of the shifts [N m]: grade changes a load by about
     as much as it is."""
@@ -334,23 +223,12 @@ def _compute_load_scale(fit: LikelihoodFit) -> float:
     return float(np.sqrt(np.mean(np.square(loads))))
 
 
-LOAD_OF_EACH_SHIFT = Candidate(
-    owns=lambda name: name.endswith(f".{LOAD_DEVIATION}"), compute_std=_compute_load_scale
-)
+LOAD_OF_EACH_SHIFT = LoadTerm(lambda name: name.endswith(f".{LOAD_DEVIATION}"), _compute_load_scale)
 """Load of its own for each shift: the grade differs between them."""
-GROWING_LOAD = Candidate(
-    EffectId.AERO_LOAD, lambda name: name == AERO, lambda _: LOAD_BALANCE.aero_std
+GROWING_LOAD = LoadTerm(
+    lambda name: name == AERO, lambda _: LOAD_BALANCE.aero_std, EffectId.AERO_LOAD
 )
 """Load that grows with the square of the speed."""
-OTHER_MINIMUM = Candidate(propose=_propose_minima)
-"""Another minimum of Q about the P0 of an element."""
-CANDIDATES: Mapping[str, Candidate] = {
-    "load_of_each_shift": LOAD_OF_EACH_SHIFT,
-    "growing_load": GROWING_LOAD,
-    "other_minimum": OTHER_MINIMUM,
-    **{effect: Candidate(effect, propose=partial(_propose_plant, effect)) for effect in PLANTS},
-}
-"""Candidate models by name, in the order in which they are tried."""
 
 
 def collect_loads(fit: LikelihoodFit) -> tuple[float, ...]:

@@ -38,7 +38,6 @@ from drivetwin.estimation.likelihood.selection.candidates import (
     GROWING_LOAD,
     LOAD_OF_EACH_SHIFT,
     find_absent_terms,
-    try_minima,
 )
 from drivetwin.estimation.likelihood.selection.sampling_mode import (
     average_modes,
@@ -73,7 +72,7 @@ class SelectionSettings:
 SELECTION = SelectionSettings()
 _STAGES = TimedStages(
     "model selection",
-    ("search", "bounds", "slow outputs", "restriction", "minima", "averaging", "other outputs"),
+    ("search", "bounds", "slow outputs", "restriction", "averaging", "other outputs"),
 )
 
 
@@ -113,11 +112,6 @@ def select_model(
         narrower = build_problem(signals, drivelines, loss_law, guess, hilly=hilly)
         best, problem = _restrict(best, point, narrower, shifts) or (best, problem)
     notes = _report_growth(best)
-    with (
-        _STAGES.enter("minima", "other minima"),
-        limit_evaluations(min(MAX_REFIT_WORK, search.left)),
-    ):
-        best = try_minima(best, problem) if is_enabled(Mechanism.OTHER_MINIMA) else best
     with (
         _STAGES.enter("averaging", "modes of signals"),
         limit_evaluations(min(MAX_REFIT_WORK, search.left)),
