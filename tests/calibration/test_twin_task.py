@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.objective import Limit
 from drivetwin.calibration.oil import OilFriction
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.spread import Spread
@@ -41,6 +43,7 @@ from tests.calibration.twins import (
     make_hydraulic_twin,
     make_twin,
 )
+from tests.support.upshift.statement import BAR
 
 REQUEST = Request(gears=("2", "3"), settings=QUICK)
 _DRAWN = {"eta": "i_in.loss.eta", "k_o": "output shaft.stiffness", "J_vehicle": "J_v.inertia"}
@@ -51,11 +54,42 @@ def test_operating_point_and_limits_come_from_the_twin() -> None:
     task = build_task(make_twin(), REQUEST)
     assert task.maneuver.point.engine_torque == 1200.0
     assert task.maneuver.point.engine_speed == 155.0
+    hardware = {
+        Metric.TORQUE_REDUCTION: 480.0,
+        Metric.TORQUE_RATE: 5e3,
+        Metric.PRESSURE_RATE: 150e5,
+    }
     assert [one.metric for one in task.limits] == [
         Metric.SHIFT_TIME,
         Metric.VIBRATION_DOSE,
         Metric.FRICTION_ENERGY,
+        *hardware,
     ]
+    assert {one.metric: one.bound for one in task.limits[3:]} == hardware
+    assert all("usual" in one.source for one in task.limits[3:])
+
+
+def test_the_operating_point_is_that_of_the_shift_in_the_log() -> None:
+    base = make_twin()
+    shift = {"torque 2-3": (1000.0, 1100.0), "speed 2-3": (170.0, 170.0), "speed 3-2": (1.0, 1.0)}
+    task = build_task(replace(base, validity={**base.validity, **shift}), REQUEST)
+    point = task.maneuver.point
+    assert (point.engine_torque, point.engine_speed) == (1050.0, 170.0)
+
+
+def test_hardware_can_be_changed() -> None:
+    usual = build_task(make_twin(), REQUEST)
+    wide = Hardware(intervention=0.5, torque_rate=float("inf"), kiss=1.5)
+    stated = (Limit(Metric.PRESSURE_RATE, 1e7), Limit(Metric.SHIFT_TIME, 1.4))
+    other = build_task(make_twin(), replace(REQUEST, hardware=wide, limits=stated))
+    assert {one.metric: one.bound for one in other.limits} == {
+        Metric.PRESSURE_RATE: 1e7,
+        Metric.SHIFT_TIME: 1.4,
+        Metric.TORQUE_REDUCTION: 600.0,
+    }
+    for task, factor in ((usual, 1.3), (other, 1.5)):
+        bound = next(one for one in task.policy.parameters if one.name == "kiss_pressure").high
+        assert bound == pytest.approx(factor * 0.8 * BAR)
 
 
 def test_draws_have_the_covariance_of_the_twin() -> None:

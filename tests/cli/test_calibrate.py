@@ -66,7 +66,13 @@ def test_writes_all_files_with_equal_values(folder: Path) -> None:
     assert {one.name for one in folder.iterdir()} == FILES
     content = read_calibration_file(folder / "calibration.toml")
     assert content.shift == "2-3"
-    assert content.limits == {"shift_time_s": 1.1, "mean_friction_energy_J": 90000.0}
+    assert content.limits == {
+        "shift_time_s": 1.1,
+        "mean_friction_energy_J": 90000.0,
+        "torque_reduction_Nm": 560.0,
+        "torque_rate_Nm_s": 5000.0,
+        "pressure_rate_Pa_s": 15e6,
+    }
     assert list(content.inputs) == ["twin.toml"]
     options = content.settings["options"]
     assert (options["draws"], options["engine torque"], options["policy"]) == (
@@ -87,7 +93,10 @@ def test_certificate_says_draws_and_confidence(folder: Path) -> None:
     jerk = [one["quantiles"]["peak_jerk"] for one in (before, after)]
     assert jerk[1]["share_95"] < jerk[0]["share_95"]
     assert jerk[1]["upper_99"] is None  # 60 draws do not support it
-    assert {one["metric"] for one in after["limits"]} == {"shift_time", "friction_energy"}
+    sources = {one["metric"]: one["source"] for one in after["limits"]}
+    assert sources.pop("shift_time") == sources.pop("friction_energy") == "as stated"
+    assert set(sources) == {"torque_reduction", "torque_rate", "pressure_rate"}
+    assert all(one.startswith("usual: ") for one in sources.values())
     assert content["metrics"]["peak_jerk"]["unit"] == "m/s^3"
 
 
@@ -289,10 +298,20 @@ def test_an_interrupted_calibration_continues_to_the_same_result(
     assert "no interrupted calibration" in capsys.readouterr().err
 
 
+def _exceeds_usual(folder: Path) -> bool:
+    """Return whether a result lies beyond the usual torque or pressure rate."""
+    metrics = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))["after"][
+        "quantiles"
+    ]
+    rates = (("torque_rate", 5e3), ("pressure_rate", 15e6), ("torque_reduction", 560.0))
+    return any(metrics[name]["share_95"] > usual for name, usual in rates)
+
+
 def test_own_bounds_limits_and_labels_are_kept(twin: Path, tmp_path: Path) -> None:
     limits, template, out = (tmp_path / name for name in ("limits.toml", "own.toml", "out"))
     limits.write_text(
         "[limits]\ntorque_reduction_Nm = 400\npressure_rate_Pa_s = 3e7\n"
+        "[hardware]\ntorque_rate_Nm_s = inf\n"
         "[bounds]\nreduction_depth = [0, 300]\nfill_time = 0.1\n"
     )
     template.write_text(
@@ -302,7 +321,11 @@ def test_own_bounds_limits_and_labels_are_kept(twin: Path, tmp_path: Path) -> No
     )
     given = ["--shift", "2-3", "--limits", str(limits), "--template", str(template)]
     assert main(["calibrate", str(twin), *given, *SHORT, "-o", str(out)]) == 0
-    found = read_calibration_file(out / "calibration.toml").parameters
+    result = read_calibration_file(out / "calibration.toml")
+    assert set(result.limits) == {"torque_reduction_Nm", "pressure_rate_Pa_s"}
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert ("Outside usual hardware: " in page) == _exceeds_usual(out)
+    found = result.parameters
     assert found["reduction_depth"].value <= 300.0
     assert found["fill_time"].value == 0.1
     after = json.loads((out / "certificate.json").read_text(encoding="utf-8"))["after"]

@@ -38,6 +38,7 @@ def write(folder: Path, text: str) -> Path:
 
 
 def test_numbers_are_in_the_order_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "a.c").touch()
     content = load_controller_file(write(tmp_path, TABLE))
     built = build_user_controller(content, tmp_path / "a.so")
     assert built.numbers == (2.0, 0.0, 0.5, 8.0, 4.0)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import Limit, Statistic, build_limit_keys
 from drivetwin.calibration.spread import Spread
@@ -89,6 +90,7 @@ def test_the_documented_limits_are_those_of_the_program(tmp_path: Path) -> None:
     path.write_text(example, encoding="utf-8")
     found = load_limits(path)
     assert found.spread == Spread()
+    assert found.hardware == Hardware()
     assert len(found.limits) == 2
     listed = re.findall(r"^\| `(\w+)` \| ([\w -]+) \|", text, re.MULTILINE)
     keys = {name: METRICS[metric].label for name, (metric, _) in build_limit_keys().items()}

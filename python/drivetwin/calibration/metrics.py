@@ -44,6 +44,7 @@ class Metric(StrEnum):
     FLARE = auto()
     TIE_UP = auto()
     TORQUE_REDUCTION = auto()
+    TORQUE_RATE = auto()
     PRESSURE_RATE = auto()
 
 
@@ -127,6 +128,12 @@ METRICS: Mapping[Metric, MetricSpec] = {
         "Largest difference between the engine torque and the driver's demand.",
         _OWN,
     ),
+    Metric.TORQUE_RATE: MetricSpec(
+        "engine torque rate",
+        "N*m/s",
+        "Largest magnitude of the rate of the engine torque.",
+        _OWN,
+    ),
     Metric.PRESSURE_RATE: MetricSpec(
         "pressure rate",
         "Pa/s",
@@ -135,7 +142,7 @@ METRICS: Mapping[Metric, MetricSpec] = {
     ),
 }
 """Definitions of the metrics, in the order of reports."""
-OF_INPUTS = (Metric.TORQUE_REDUCTION, Metric.PRESSURE_RATE)
+OF_INPUTS = (Metric.TORQUE_REDUCTION, Metric.TORQUE_RATE, Metric.PRESSURE_RATE)
 """Metrics that need the inputs of the driveline."""
 
 
@@ -296,9 +303,17 @@ def _compute_torque_reduction(runs: _Runs) -> FloatArray:
     return _extend(np.abs(runs.inputs[:, 0] - demand).max(axis=-1), runs)
 
 
+def _compute_torque_rate(runs: _Runs) -> FloatArray:
+    return _compute_input_rate(runs, slice(0, 1))
+
+
 def _compute_pressure_rate(runs: _Runs) -> FloatArray:
+    return _compute_input_rate(runs, slice(1, 3))
+
+
+def _compute_input_rate(runs: _Runs, chosen: slice) -> FloatArray:
     assert runs.inputs is not None
-    steps = np.abs(np.diff(runs.inputs[:, 1:3], axis=-1)).max(axis=(-1, -2))
+    steps = np.abs(np.diff(runs.inputs[:, chosen], axis=-1)).max(axis=(-1, -2))
     return _extend(steps / runs.maneuver.step, runs)
 
 
@@ -319,6 +334,7 @@ _COMPUTE: Mapping[Metric, Callable[[_Runs], FloatArray]] = {
     Metric.FLARE: _compute_flare,
     Metric.TIE_UP: _compute_tie_up,
     Metric.TORQUE_REDUCTION: _compute_torque_reduction,
+    Metric.TORQUE_RATE: _compute_torque_rate,
     Metric.PRESSURE_RATE: _compute_pressure_rate,
 }
 

@@ -24,11 +24,12 @@ class Statistic(StrEnum):
 
 @dataclass(frozen=True)
 class Limit:
-    """Upper bound (SI) of a metric, for its mean or for 95 % of the draws."""
+    """Upper bound (SI) of a metric, for its mean or for 95 % of the draws, and its `source`."""
 
     metric: Metric
     bound: float
     statistic: Statistic = Statistic.SHARE_95
+    source: str = ""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.bound < float("inf"):
@@ -54,6 +55,7 @@ _SUFFIX = {
     "W": "W",
     "rad/s": "rad_s",
     "Pa/s": "Pa_s",
+    "N*m/s": "Nm_s",
 }
 """Units as keys of a file have them."""
 

@@ -14,9 +14,9 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.profiles import Control
 from drivetwin.errors import InputError
 
-_AT_BOUND = 1e-4
-"""Distance from a bound, over the range, within which a parameter is at it: linear programs end on
-it to their tolerance."""
+_AT_BOUND = 0.01
+"""Distance from a bound, over the range, within which a parameter is at it: moves of the last
+polish stop short of the bound by less."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from drivetwin.calibration.calibrate import (
 )
 from drivetwin.calibration.certificate import compute_quantiles
 from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.hardware import Hardware, add_hardware
 from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_gears
 from drivetwin.calibration.metrics import Metric
@@ -25,7 +26,7 @@ from drivetwin.calibration.oil import OilFriction, OilState
 from drivetwin.calibration.options import USUAL_WHEEL_RADIUS, CalibrationOptions
 from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
-from drivetwin.calibration.policy import Space
+from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
 from drivetwin.calibration.settings import CalibrationSettings
@@ -61,6 +62,7 @@ class Request(CalibrationOptions):
     start: Mapping[str, float] = field(default_factory=dict)
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
     controller: UserController | None = None
+    hardware: Hardware = field(default_factory=Hardware)
 
 
 def build_task(twin: Twin, request: Request) -> Task:
@@ -84,13 +86,31 @@ def build_task(twin: Twin, request: Request) -> Task:
     unit = None if units is None else units.nominal
     pressure = _choose_pressure(twin, request)
     setup = PolicySetup(maneuver, pressure, unit, request.task, request.controller)
-    policy = POLICIES[request.policy](setup).set_bounds(request.bounds)
+    policy = POLICIES[request.policy](setup)
+    policy = policy.set_bounds({**_bound_kiss(policy, setup, request), **request.bounds})
     policy = policy.set_start(request.start)
     draw = Draw(TwinDraws(twin, shift, request.spread, oil), units)
     task = Task(maneuver, policy, draw, request.limits or (), request.seed, request.settings)
     if request.limits is None:
         task = task.set_limits(derive_limits(task))
+    if task.limits:
+        task = task.set_limits(add_hardware(task.limits, request.hardware, point.engine_torque))
     return task
+
+
+def _bound_kiss(
+    policy: Policy, setup: PolicySetup, request: Request
+) -> dict[str, tuple[float, float]]:
+    """Return the bounds of the kiss pressure [Pa] by the hardware; empty without it."""
+    contact = setup.maneuver.oncoming.P0
+    if setup.unit is not None:
+        contact = max(contact, setup.unit.oncoming.kiss_pressure)
+    highest = request.hardware.kiss * contact
+    return {
+        one.name: (one.low, min(one.high, highest))
+        for one in policy.parameters
+        if one.name == "kiss_pressure" and one.unit == "Pa" and one.start <= highest
+    }
 
 
 def build_profiles(
@@ -156,12 +176,17 @@ def derive_limits(task: Task) -> tuple[Limit, ...]:
     for metric, statistic in DEFAULT_LIMITS.items():
         found = compute_quantiles(outcome.values[metric], task.settings.confidence)
         value = found.mean_upper if statistic is Statistic.MEAN else found.upper_95
-        limits.append(Limit(metric, found.share_95 if value is None else value, statistic))
+        bound = found.share_95 if value is None else value
+        limits.append(Limit(metric, bound, statistic, "no worse than the start"))
     return tuple(limits)
 
 
 def choose_point(twin: Twin, request: Request) -> OperatingPoint:
-    """Return the operating point: as requested, else the middle of the range of the log."""
+    """Return the operating point: as requested, else that of the log.
+
+    It is the middle over the log's shifts of these gears at their begin, without such shifts that
+    of the range of the log.
+    """
     torque, speed = request.engine_torque, request.engine_speed
     missing = [
         name
@@ -173,10 +198,12 @@ def choose_point(twin: Twin, request: Request) -> OperatingPoint:
             f"the twin {twin.name!r} does not say which engine {' and '.join(missing)} its log had",
             "give --engine-torque and --engine-speed",
         )
+    label = "-".join(request.gears)
+    middle = {name: 0.5 * sum(ends) for name, ends in twin.validity.items()}
     if torque is None:
-        torque = 0.5 * sum(twin.validity["torque"])
+        torque = middle.get(f"torque {label}", middle["torque"])
     if speed is None:
-        speed = 0.5 * sum(twin.validity["speed"])
+        speed = middle.get(f"speed {label}", middle["speed"])
     if not speed > 0.0:
         raise InputError(f"the engine speed is {speed:g} rad/s", "give one above zero")
     return OperatingPoint(torque, speed, request.oil_temperature)

@@ -173,6 +173,7 @@ def _build_request(
         limits=given.limits or None,
         spread=given.spread,
         oil=given.oil,
+        hardware=given.hardware,
         bounds=given.bounds,
         settings=replace(settings, starts=0) if logs and request.start else settings,
     )

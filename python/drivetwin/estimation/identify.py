@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import TimedStages
@@ -243,7 +245,22 @@ def _compute_validity(log: PreparedLog, found: EstimateSet) -> dict[str, tuple[f
         ranges["slip"] = (0.0, span([c.slip for c in found.friction.values()])[1])
     if log.oil_temperature is not None:
         ranges[OIL_TEMPERATURE] = log.oil_temperature
-    return ranges
+    return ranges | _find_operating_points(log)
+
+
+def _find_operating_points(log: PreparedLog) -> dict[str, tuple[float, float]]:
+    """Find engine torque [N m] and speed [rad/s] at the begin of the shifts, by quantity and gears.
+
+    The names are such as `torque 2-3`.
+    """
+    found: dict[str, list[float]] = {}
+    for one in log.signals:
+        begin, gears = one.shift.torque_phase[0], f"{one.shift.start_gear}-{one.shift.end_gear}"
+        for name, signal in (("torque", one.engine_torque), ("speed", one.engine_speed)):
+            value = float(np.interp(begin, signal.time, signal.values))
+            if np.isfinite(value):
+                found.setdefault(f"{name} {gears}", []).append(value)
+    return {name: (min(values), max(values)) for name, values in found.items()}
 
 
 def _collect_settings(design: DesignData, method: Method) -> dict[str, Any]:

@@ -219,6 +219,7 @@ def build_certificate_document(found: Calibration) -> dict[str, Any]:
                     "upper": one.upper,
                     "state": one.state.value,
                     "binding": one.binding,
+                    "source": one.limit.source or "as stated",
                 }
                 for one in found.after.certificate.limits
             ],

@@ -12,6 +12,7 @@ from pydantic import Field, FiniteFloat
 from scipy.constants import zero_Celsius
 
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
+from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.objective import Limit, build_limit_keys
 from drivetwin.calibration.oil import FRICTION_SLOPE, FRICTION_SLOPE_STD, OilFriction
 from drivetwin.calibration.spread import Spread
@@ -41,11 +42,12 @@ class OilRecord(Record):
 
 
 class LimitsFile(Record):
-    """A file of limits: upper bounds, the spread between units, the oil, bounds of parameters."""
+    """File of limits: upper bounds, spread between units, oil, hardware, bounds of parameters."""
 
     limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]]
     spread: Spread = Spread()
     oil: OilRecord = OilRecord()
+    hardware: Hardware = Hardware()
     bounds: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat]] = Field(default_factory=dict)
 
     def list_bounds(self) -> dict[str, tuple[float, float]]:
@@ -57,11 +59,12 @@ class LimitsFile(Record):
 
 @dataclass(frozen=True)
 class Requirements:
-    """Limits, spread and oil of a file, and bounds of the policy's parameters by name."""
+    """Limits, spread, oil and hardware of a file, and bounds of the policy's parameters by name."""
 
     limits: tuple[Limit, ...]
     spread: Spread = field(default_factory=Spread)
     oil: OilFriction = field(default_factory=OilFriction)
+    hardware: Hardware = field(default_factory=Hardware)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
@@ -88,4 +91,4 @@ def load_limits(path: Path) -> Requirements:
     limits = tuple(Limit(keys[name][0], bound, keys[name][1])
                    for name, bound in content.limits.items())  # fmt: skip
     drawn = content.spread, content.oil.to_friction()
-    return Requirements(limits, *drawn, content.list_bounds())
+    return Requirements(limits, *drawn, content.hardware, content.list_bounds())

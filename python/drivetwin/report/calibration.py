@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivetwin._util.display_units import RPM, spell_unit
+from drivetwin._util.display_units import RPM, Display, get_display_unit, spell_unit
 from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitCheck, LimitState
 from drivetwin.calibration.front import Front
+from drivetwin.calibration.hardware import describe_unusual
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.operating_map import MapPoint, OperatingMap
@@ -23,6 +24,7 @@ from drivetwin.report.blocks import (
     FigureBlock,
     Section,
     TableBlock,
+    TextBlock,
     Tile,
     TilesBlock,
     Tone,
@@ -91,7 +93,7 @@ def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Sec
             "result",
             "Result",
             "Statistics over fresh draws that were not optimised over.",
-            [_build_tiles(found), _build_limits(found), *outside],
+            [_build_tiles(found), *_build_headline(found), _build_limits(found), *outside],
         ),
         Section("profiles", "Profiles", "Before and after, over the spread band.", [profiles]),
         Section(
@@ -150,6 +152,7 @@ def build_calibration_blocks(
     around = [build_front_section(front), build_map_section(mapped)]
     tables = [one for section in around for one in section.blocks]
     return [
+        *_build_headline(found),
         *(_build_limits(found), _build_statistics(found), _build_events(found)),
         *(_build_shares(found), _build_bounds(found)),
         *tables,
@@ -157,11 +160,38 @@ def build_calibration_blocks(
     ]
 
 
+def _build_headline(found: Calibration) -> list[Block]:
+    """Build the result in a sentence, what got worse, and what usual hardware cannot do."""
+    before, after = (one.certificate.quantiles for one in (found.before, found.after))
+    old, new = before[Metric.PEAK_JERK].share_95, after[Metric.PEAK_JERK].share_95
+    limits = found.after.certificate.limits
+    kept = sum(one.state is not LimitState.EXCEEDED for one in limits)
+    worse = [
+        f"{METRICS[name].label} {old:.4g} → {new:.4g} {display.label}"
+        for name in METRICS
+        for display in [get_metric_display(name)]
+        for old, new in [
+            (before[name].share_95 * display.factor, after[name].share_95 * display.factor)
+        ]
+        if after[name].share_95 > (before[name].upper_95 or before[name].worst)
+    ]
+    usual = {name: one.share_95 for name, one in after.items()}
+    unusual = describe_unusual(usual, found.task.maneuver.point.engine_torque)
+    return [
+        *make_notes("Worse than the start, for 95 % of the units", worse, Tone.DOUBTFUL),
+        *([TextBlock(unusual)] if unusual else []),
+        TextBlock(
+            f"Peak jerk of 95 % of the units {old:.1f} → {new:.1f} m/s³ "
+            f"({100.0 * (new / old - 1.0):+.0f} %); {kept} of {len(limits)} limits are kept."
+        ),
+    ]
+
+
 def _build_limits(found: Calibration) -> TableBlock:
     rows = [_build_limit_row(one) for one in found.after.certificate.limits]
     return make_table(
         "Limits; the upper bound holds with the stated confidence",
-        ("metric", "for", ("limit", "s"), ("value", ".4g"), ("upper", ".4g"), "state"),
+        ("metric", "for", ("limit", "s"), ("value", ".4g"), ("upper", ".4g"), "state", "source"),
         rows,
     )
 
@@ -174,6 +204,7 @@ def _build_limit_row(one: LimitCheck) -> tuple[object, ...]:
         one.value * display.factor,
         None if one.upper is None else one.upper * display.factor,
         make_badge(one.text, _TONES[one.state]),
+        one.limit.source or "as stated",
     )
 
 
@@ -251,16 +282,24 @@ def _build_values(found: Calibration) -> TableBlock:
     rows = []
     for one, old, new in zip(found.task.policy.parameters, before, after, strict=True):
         text = one.text if one.free else f"{one.text} (kept)"
-        rows.append((one.name, spell_unit(one.unit), old, new, one.low, one.high, text))
-    numbers = ((name, ".5g") for name in ("before", "after", "low", "high"))
-    columns: Sequence[Column] = ("parameter", "unit", *numbers, "meaning")
-    return make_table("Parameters of the policy, SI", columns, rows)
+        display = get_parameter_display(one.unit)
+        numbers = (number * display.factor for number in (old, new, one.low, one.high))
+        rows.append((one.name, display.label, *numbers, text))
+    heads = ((name, ".5g") for name in ("before", "after", "low", "high"))
+    columns: Sequence[Column] = ("parameter", "unit", *heads, "meaning")
+    return make_table("Parameters of the policy", columns, rows)
+
+
+def get_parameter_display(unit: str) -> Display:
+    """Return the display unit of a parameter: pressures are shown in bar, others in their unit."""
+    return get_display_unit(unit) if unit in ("Pa", "Pa/s") else Display(spell_unit(unit))
 
 
 def _build_bounds(found: Calibration) -> TableBlock:
     rows = [
-        (one.name, spell_unit(one.unit), end, "lower" if end == one.low else "upper", one.text)
+        (one.name, at.label, end * at.factor, "lower" if end == one.low else "upper", one.text)
         for one, end in found.task.policy.list_at_bounds(found.after.values)
+        for at in [get_parameter_display(one.unit)]
     ]
     columns: Sequence[Column] = ("parameter", "unit", ("bound", ".5g"), "side", "meaning")
     return make_table(f"Bounds that bind: {len(rows)}", columns, rows)

@@ -254,7 +254,9 @@ def build_provenance_section(found: Identification) -> Section:
 def _build_validity_table(found: Identification) -> TableBlock:
     rows = []
     for name, ends in found.validity.items():
-        label, display = _RANGES.get(name, (name, Display("SI")))
+        stem, *gears = name.split(" ")
+        label, display = _RANGES.get(stem, (stem, Display("SI")))
+        label = f"{label} at the begin of {gears[0]}" if gears else label
         rows.append((label, *(end * display.factor for end in ends), display.label))
     return make_table(
         "Range covered by the log; the model is not validated outside it.",
