@@ -10,19 +10,27 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
 from drivetwin.channels.mapping_text import format_mapping
 from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.bus_file import BusFile
 from drivetwin.files.fit_file import build_fit_file
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, build_json_schema
+from drivetwin.files.tcu_file import TcuFile
+from drivetwin.files.tcu_twin_file import format_tcu_twin
 from drivetwin.files.twin_file import save_twin
 from drivetwin.fit.model_file import format_model
 from drivetwin.fit.synthesize import ModelName, read_builtin
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS
+from drivetwin.tcu.card import ControllerCardFile, make_card
+from drivetwin.tcu.identify import TcuTwin
+from drivetwin.tcu.problem import RowNoise
+from drivetwin.tcu.synthesize import CARD, format_card
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report import sample
@@ -46,6 +54,12 @@ def twin() -> Twin:
     return build_twin(sample.identification(), sample.card())
 
 
+def make_tcu_twin() -> TcuTwin:
+    card = make_card(ControllerCardFile.model_validate(CARD))
+    noise = RowNoise({"engine_speed": 0.1}, {"engine_speed": 9.0})
+    return TcuTwin(card, ("J_engine",), np.zeros(1), np.eye(1), noise, ("1-2",))
+
+
 def elements() -> list[dict[str, Any]]:
     """Examples of the reference page, one of each type."""
     found = map(json.loads, fenced(REFERENCE / "elements.md", "json"))
@@ -57,6 +71,20 @@ def documents(kind: FileKind, folder: Path) -> Iterator[Mapping[str, Any]]:
     match kind:
         case FileKind.RESULT:
             yield json.loads(ResultFile.from_result(sample.identification()).to_json())
+        case FileKind.TCU:
+            empty_log = TcuFile(
+                version="1",
+                logs=[],
+                status=ModelStatus.VALID,
+                reason="",
+                shifts={},
+                parameters={},
+                noise={},
+                held_out=[],
+            )
+            yield json.loads(empty_log.to_json())
+        case FileKind.TCU_TWIN:
+            yield json.loads(format_tcu_twin(make_tcu_twin()).to_json())
         case FileKind.FIT:
             yield json.loads(build_fit_file(fit_log(ModelName.TIP_IN), ["a.csv"], {}).to_json())
         case FileKind.BUS:
@@ -85,6 +113,8 @@ def _toml(kind: FileKind, folder: Path) -> list[str]:
             return [*toml_files(PACKAGE / "fit" / "examples"), *made, *page]
         case FileKind.RATIO_CARD:
             return fenced(ROOT / "docs" / "howto" / "bus-only.md", "toml")
+        case FileKind.TCU_CARD:
+            return [format_card(), *fenced(ROOT / "docs" / "howto" / "controller-log.md", "toml")]
         case FileKind.FLEET_RULES:
             return fenced(ROOT / "docs" / "howto" / "fleet.md", "toml")[:1]
         case _:

@@ -26,6 +26,7 @@ SHORT = {
     "reduce-a-gearbox.md": (),
 }
 LONG = {
+    "controller-log.md": (),
     "compare.md": (
         *OUT,
         "copy out monday",

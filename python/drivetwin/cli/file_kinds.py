@@ -35,7 +35,10 @@ _REMEDIES: dict[FileRole, dict[FileRole, str]] = {
         FileRole.MAPPING: "give the mapping with --channels, and the card with --vehicle",
     },
 }
-_FAMILIES = {"twin": FileRole.TWIN, **dict.fromkeys(("result", "bus", "fit"), FileRole.RESULT)}
+_FAMILIES = {
+    **dict.fromkeys(("twin", "tcu-twin"), FileRole.TWIN),
+    **dict.fromkeys(("result", "bus", "fit", "tcu"), FileRole.RESULT),
+}
 """Roles of the files that commands wrote, by the family of their schema."""
 _ERRORS: dict[FileRole, type[InputError]] = {
     FileRole.TWIN: ResultFileError,

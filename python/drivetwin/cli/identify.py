@@ -78,10 +78,19 @@ def identify(request: Identify) -> Iterator[Outcome]:
     Bus logs without pressures and output torque need a card of the ratios alone, or none: all logs
     are then of one vehicle and identified as one, into DIR/bus.json and DIR/report.html. With
     --hold-out, the decays of a LOG are predicted by the others.
+
+    Logs of a gearbox control (commanded pressures, engine torque of the bus) need a card with
+    converter and [[changes]]; see 'drivetwin schema tcu-card'. All shifts of all logs are fitted as
+    one, into DIR/tcu.json, DIR/twin.toml and DIR/report.html; every fifth is held out, unless
+    --hold-out names others.
     """
     from drivetwin.cli.identify_joint import identify_jointly
     from drivetwin.cli.identify_run import identify_log
+    from drivetwin.cli.identify_tcu import identify_controller_logs, is_of_controller
 
+    if is_of_controller(request):
+        yield identify_controller_logs(request)
+        return
     logs, how = request.logs, request.options
     if _is_bus(request):
         yield identify_bus_logs(request)

@@ -57,9 +57,13 @@ def simulate(request: Simulate) -> Outcome:
     The inputs are the measured engine torque and pressures. The log can differ from the log of the
     identification. Ratios and shift elements are those of the twin; a vehicle card is not needed.
     The result of a fit simulates the recording as a whole by its model.toml.
+    The twin of a gearbox control's log predicts shifts from commands and bus torque, with bands.
     """
+    from drivetwin.cli.identify_tcu import find_controller_twin, simulate_controller
     from drivetwin.report.results import open_result
 
+    if (twin := find_controller_twin(request.twin)) is not None:
+        return simulate_controller(twin, request)
     made = open_result(request.twin)
     return _simulate_fit(made, request) if made.is_fit else _simulate_twin(made, request)
 

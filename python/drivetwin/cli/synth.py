@@ -28,7 +28,7 @@ class Bench(Request):
         "power_on_down, power_off_up, power_off_down: the other kinds of shift; input_gear: behind "
         "an input gear of 1.2; dual_clutch, manual: a car with such a gearbox; "
         "open_converter: behind an open torque converter; hydraulics: with the commands of the "
-        "controller.",
+        "controller; controller_log: twelve shifts as a gearbox control logs them (synth).",
         metavar="NAME",
         default=ScenarioName.PAPER_STEPS,
     )
@@ -72,6 +72,8 @@ def synth(request: Synthesize) -> Outcome:
     is one of its driveline, and the model file NAME.model.toml has first guesses.
     """
     write = _write_scenario_log if request.model is None else _write_model_log
+    if request.model is None and request.scenario is ScenarioName.CONTROLLER_LOG:
+        write = _write_controller_log
     with show_step(f"running {request.model or request.scenario}"):
         files = write(request)
     return Outcome(document=files, files=tuple(files.values()))
@@ -89,6 +91,28 @@ def _write_scenario_log(request: Synthesize) -> dict[str, Path]:
     bench = run(setup, request.seed, noise=request.noise, effects=effects)
     log, card, truth = write_run(request.output, bench)
     return {"log": log, "card": card, "truth": truth}
+
+
+def _write_controller_log(request: Synthesize) -> dict[str, Path]:
+    """Write log, card and truth of shifts as a gearbox control logs them, all or none."""
+    from drivetwin.errors import InputError, Where
+    from drivetwin.tcu.synthesize import make_log
+
+    output, place = request.output, Where(file=str(request.output))
+    if output.suffix.casefold() != ".csv":
+        what = "the log of a gearbox control is a CSV file"
+        raise InputError(what, "give a name that ends in .csv", place)
+    if request.effect or request.drum is not None or request.torque_reduction:
+        what = "the log of a gearbox control has no effects, drums or torque reduction to choose"
+        raise InputError(what, "leave out --effect, --drum and --torque-reduction")
+    made = make_log(request.seed, noise=request.noise)
+    files = {
+        "log": (output, made.log),
+        "card": (output.with_suffix(".card.toml"), made.card),
+        "truth": (output.with_suffix(".truth.json"), made.truth),
+    }
+    write_texts(output.parent, {path.name: text for path, text in files.values()})
+    return {name: path for name, (path, _) in files.items()}
 
 
 def _write_model_log(request: Synthesize) -> dict[str, Path]:

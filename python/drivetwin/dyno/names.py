@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class ScenarioName(StrEnum):
-    """Built-in runs of the virtual dynamometer."""
+    """Built-in runs of the virtual dynamometer, and the log of a gearbox control."""
 
     PAPER = "paper"
     PAPER_STEPS = "paper_steps"
@@ -22,3 +22,4 @@ class ScenarioName(StrEnum):
     MANUAL = "manual"
     OPEN_CONVERTER = "open_converter"
     HYDRAULICS = "hydraulics"
+    CONTROLLER_LOG = "controller_log"

@@ -32,6 +32,9 @@ class FileKind(StrEnum):
     FIT = "fit"
     RATIO_CARD = "ratio-card"
     BUS = "bus"
+    TCU_CARD = "tcu-card"
+    TCU = "tcu"
+    TCU_TWIN = "tcu-twin"
 
 
 _MODELS = {
@@ -46,6 +49,9 @@ _MODELS = {
     FileKind.FIT: ("files.fit_file", "FitFile"),
     FileKind.RATIO_CARD: ("vehicle.ratio_card", "RatioCardFile"),
     FileKind.BUS: ("files.bus_file", "BusFile"),
+    FileKind.TCU_CARD: ("tcu.card", "ControllerCardFile"),
+    FileKind.TCU: ("files.tcu_file", "TcuFile"),
+    FileKind.TCU_TWIN: ("files.tcu_twin_file", "TcuTwinFile"),
 }
 """Module below the package, and the model there, by which the program itself checks the file; each
 is imported when it is asked for."""

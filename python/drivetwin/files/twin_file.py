@@ -22,7 +22,7 @@ from drivetwin.channels.read_options import (
     RememberedMapping,
     TimeColumn,
 )
-from drivetwin.errors import InputError, ResultFileError, suggest_spelling
+from drivetwin.errors import InputError, ResultFileError, Where, suggest_spelling
 from drivetwin.estimation.result.estimate import LoadLaw
 from drivetwin.estimation.result.method import Method
 from drivetwin.files.records import (
@@ -37,6 +37,7 @@ from drivetwin.files.records import (
     read_record,
     write_toml,
 )
+from drivetwin.files.tcu_twin_file import is_tcu_twin
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
@@ -133,8 +134,15 @@ def read_twin_file(path: Path | str) -> TwinFile:
     """Read and check `twin.toml`.
 
     Raises ResultFileError where the file is missing, damaged or of a newer schema, or where its
-    tables contradict each other.
+    tables contradict each other, and for a twin from the log of a gearbox control.
     """
+    if is_tcu_twin(path):
+        raise ResultFileError(
+            "this twin is of a gearbox with converter, from the log of its control; this command "
+            "takes twins of a driveline with measured pressures",
+            "simulate it: 'drivetwin simulate TWIN LOG'",
+            Where(file=str(path)),
+        )
     content = read_record(path, parse_toml, TWIN_SCHEMA, TwinFile)
     raise_faults(
         find_twin_faults(content),

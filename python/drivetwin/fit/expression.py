@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
@@ -115,14 +115,16 @@ def resolve_numbers(
     unknowns: Mapping[str, Unknown],
     expressions: Mapping[str, Expression],
     places: Mapping[str, Place],
+    beside: Collection[str] = (),
 ) -> ResolvedNumbers:
     """Resolve the unknowns of a network and the functions of them.
 
+    Unknowns named in `beside` need no path: something else than the network depends on them.
     Raises InputError for a path that leads to no number, for two that set the same one, and for an
     expression that is none.
     """
     formulas = {name: _read_formula(name, one, unknowns) for name, one in expressions.items()}
-    named = {name for one in formulas.values() for name in one.of}
+    named = {*beside, *(name for one in formulas.values() for name in one.of)}
     sought = [
         resolve_unknown(name, one, places, named=name in named) for name, one in unknowns.items()
     ]

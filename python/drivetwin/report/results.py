@@ -16,9 +16,10 @@ from drivetwin._util.toml import parse_toml
 from drivetwin.errors import ResultFileError, Where
 from drivetwin.estimation.result.estimate import Estimate, SignalFit
 from drivetwin.files.bus_file import BUS_SCHEMA, BusFile
-from drivetwin.files.fit_file import FIT_SCHEMA, FitFile, UnknownRecord
-from drivetwin.files.records import FitRecord, Record, read_record
+from drivetwin.files.fit_file import FIT_SCHEMA, FitFile
+from drivetwin.files.records import FitRecord, ParameterRecord, Record, read_record
 from drivetwin.files.result_file import RESULT_SCHEMA, ResultFile
+from drivetwin.files.tcu_file import TCU_SCHEMA, TcuFile
 from drivetwin.files.twin_file import load_twin
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.parameters import ParameterSpec
@@ -27,6 +28,7 @@ from drivetwin.report.bus import explain_bus
 from drivetwin.report.find_reports import Candidate
 from drivetwin.report.fit import build_fit_verdict
 from drivetwin.report.model_verdict import build_verdict_block, explain_result
+from drivetwin.report.tcu import explain_tcu
 from drivetwin.twin.twin import Twin
 
 REPORT, TWIN = "report.html", "twin.toml"
@@ -35,6 +37,7 @@ _SCHEMAS: dict[str, tuple[str, type[Record]]] = {
     "result.json": (RESULT_SCHEMA, ResultFile),
     "bus.json": (BUS_SCHEMA, BusFile),
     "fit.json": (FIT_SCHEMA, FitFile),
+    "tcu.json": (TCU_SCHEMA, TcuFile),
 }
 """Schema and record of each result by the name of its file."""
 _NO_TWIN = {
@@ -48,16 +51,21 @@ _NO_TWIN = {
         "'drivetwin simulate' runs the fitted model over a log; '--to csv', ssv, cdfx, dcm and m "
         "write its values",
     ),
+    TcuFile: (
+        "the twin from the log of a gearbox control has commands as inputs, and a converter",
+        "'drivetwin simulate' predicts shifts with it; '--to csv', ssv, cdfx, dcm and m write its "
+        "values",
+    ),
 }
 """Reason and remedy where a result cannot have a twin."""
 
 
 @dataclass(frozen=True, eq=False)
 class MadeResult:
-    """A result in `file`: the content of `result.json`, `bus.json` or `fit.json`, or a twin."""
+    """A result in `file`: the content of its file, or a twin."""
 
     file: Path
-    content: ResultFile | BusFile | FitFile | Twin
+    content: ResultFile | BusFile | FitFile | TcuFile | Twin
 
     @property
     def estimates(self) -> Mapping[str, Estimate]:
@@ -67,6 +75,8 @@ class MadeResult:
                 return twin.parameters
             case FitFile() as fit:
                 return {name: _restore_unknown(name, one) for name, one in fit.unknowns.items()}
+            case TcuFile() as tcu:
+                return {name: _restore_unknown(name, one) for name, one in tcu.parameters.items()}
             case content:
                 return {name: one.to_estimate(name) for name, one in content.parameters.items()}
 
@@ -77,7 +87,7 @@ class MadeResult:
 
     def describe_origin(self) -> str:
         """Return program and logs of a result of bus logs or of a fit, for a comment."""
-        assert isinstance(self.content, BusFile | FitFile)
+        assert isinstance(self.content, BusFile | FitFile | TcuFile)
         return f"drivetwin {self.content.version}, from {', '.join(self.content.logs)}"
 
     @property
@@ -107,6 +117,8 @@ class MadeResult:
                 return None
             case FitFile() as fit:
                 return build_fit_verdict(fit.status, fit.chi2)
+            case TcuFile() as tcu:
+                return explain_tcu(tcu.status, tcu.reason)
             case BusFile() as bus:
                 findings = [one.to_finding() for one in bus.findings]
                 inside = [one.inside for one in bus.predictions]
@@ -155,6 +167,9 @@ class MadeResult:
             case BusFile() as content:
                 friction, fit = {}, {}
                 origin = "bus logs", dict.fromkeys(content.logs, "")
+            case TcuFile() as content:
+                friction, fit = {}, {}
+                origin = "log of a gearbox control", dict.fromkeys(content.logs, "")
             case FitFile() as content:
                 friction = {}
                 fit = {name: {"all": one} for name, one in _to_fits(content.fit[0]).items()}
@@ -162,8 +177,8 @@ class MadeResult:
         return Candidate(name, origin[0], self.estimates, friction, fit, origin[1], content.version)
 
 
-def _restore_unknown(name: str, record: UnknownRecord) -> Estimate:
-    """Return the estimate of an unknown with its own declaration."""
+def _restore_unknown(name: str, record: ParameterRecord) -> Estimate:
+    """Return an estimate with its own declaration."""
     spec = ParameterSpec(name, name, name, record.unit, "unknown of a fit", -np.inf, np.inf)
     return replace(record.to_estimate(name), spec=spec)
 

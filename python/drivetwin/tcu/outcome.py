@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""From logs of a gearbox control and a card to a plant that held-out shifts have tested."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from drivetwin.channels.units import RPM
+from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.estimation.result.estimate import Estimate, Verdict
+from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.estimation.result.verdict import reject_identified
+from drivetwin.tcu.card import ControllerCard
+from drivetwin.tcu.identify import FittedShifts, TcuTwin, fit_shifts
+from drivetwin.tcu.log import SPEEDS, ControllerLog, ControllerShift, read_controller_log
+from drivetwin.tcu.predict import PredictedShift, predict_shift
+from drivetwin.tcu.problem import FLOOR
+from drivetwin.tcu.statements import state
+
+_EVERY = 5
+"""One shift of so many is held out where none is named."""
+_LEAST_SHIFTS = 4
+"""Fewest shifts of a fit: gains, fill and P0 of two elements, and load, vary from shift to
+shift."""
+_LEAST_INSIDE = 0.8
+"""Share of the rows of held-out shifts inside the 95 % band below which the band is no band: so few
+have a probability of 1 % for one shift in four that is missed."""
+
+
+@dataclass(frozen=True, eq=False)
+class TcuIdentification:
+    """Result: fit, estimates by name, predictions of held-out shifts, status with its reason."""
+
+    logs: tuple[ControllerLog, ...]
+    found: FittedShifts
+    estimates: Mapping[str, Estimate]
+    predictions: tuple[PredictedShift, ...]
+    status: ModelStatus
+    reason: str
+
+    @property
+    def twin(self) -> TcuTwin:
+        """Plant."""
+        return self.found.twin
+
+
+def identify_controller(
+    paths: Sequence[Path],
+    card: ControllerCard,
+    mapping: Path | None = None,
+    hold_out: Collection[int] | None = None,
+    *,
+    seed: int = 0,
+) -> TcuIdentification:
+    """Identify the plant of one vehicle from logs of its gearbox control.
+
+    Parameters
+    ----------
+    paths
+        Logs; their shifts are numbered in order from 1.
+    card
+        Card of the gearbox.
+    mapping
+        Channel mapping, None where columns are recognised by name.
+    hold_out
+        Numbers of the shifts to predict; None for every fifth.
+    seed
+        Seed of the draws of the bands.
+
+    Raises
+    ------
+    InputError
+        For a shift that does not exist, and where too few are left to fit.
+    IdentificationError
+        Where the simulation cannot be brought onto the shifts.
+    """
+    logs = tuple(read_controller_log(path, card, mapping) for path in paths)
+    shifts = [one for log in logs for one in log.shifts]
+    shifts = [replace(one, number=k) for k, one in enumerate(shifts, start=1)]
+    held = _find_held(shifts, hold_out)
+    fitted = [one for one in shifts if one.number not in held]
+    if len(fitted) < _LEAST_SHIFTS:
+        raise InputError(
+            f"{len(fitted)} shifts are left to fit",
+            f"record at least {_LEAST_SHIFTS}; 15 to 20 of every kind of interest are usual",
+            Where(file=logs[0].source),
+        )
+    found = fit_shifts(card, fitted)
+    predictions = predict(found.twin, [one for one in shifts if one.number in held], seed)
+    status, reason = _judge(found, predictions)
+    estimates = state(found)
+    if status is ModelStatus.NOT_VALID:
+        estimates = {name: withdraw(one, reason) for name, one in estimates.items()}
+    elif status is not ModelStatus.VALID:
+        estimates = {name: reject_identified(one, reason) for name, one in estimates.items()}
+    return TcuIdentification(logs, found, estimates, predictions, status, reason)
+
+
+def predict(
+    twin: TcuTwin, shifts: Sequence[ControllerShift], seed: int = 0
+) -> tuple[PredictedShift, ...]:
+    """Predict shifts with a twin; one that cannot be simulated is left out."""
+    rng, predicted = np.random.default_rng(seed), []
+    for one in shifts:
+        try:
+            predicted.append(predict_shift(twin, one, rng))
+        except IdentificationError:
+            continue
+    return tuple(predicted)
+
+
+def _find_held(shifts: Sequence[ControllerShift], wanted: Collection[int] | None) -> frozenset[int]:
+    """Return the numbers of held-out shifts: every fifth where none is named."""
+    known = {one.number for one in shifts}
+    if wanted is None:
+        return frozenset(number for number in known if number % _EVERY == 0)
+    for number in wanted:
+        if number not in known:
+            raise InputError(
+                f"there is no shift {number}",
+                f"give numbers from 1 to {len(known)}",
+                Where(key="--hold-out"),
+            )
+    return frozenset(wanted)
+
+
+def _judge(found: FittedShifts, predictions: Sequence[PredictedShift]) -> tuple[ModelStatus, str]:
+    """Judge the plant by the residuals of fitted shifts and the bands of held-out ones."""
+    size = max(found.noise.sigma[name] for name in SPEEDS)
+    shown = f"The speeds of the fitted shifts are met to {size / RPM:.1f} rpm rms"
+    if size > FLOOR:
+        return ModelStatus.NOT_VALID, (
+            f"{shown}, worse than the {FLOOR / RPM:.0f} rpm that the intervals include: the model "
+            "lacks something. Check ratios, levers and converter of the card."
+        )
+    if not predictions:
+        return ModelStatus.NOT_VALIDATED, f"{shown}; no shift was held out."
+    rows = sum(int(np.count_nonzero(one.rows)) for one in predictions)
+    inside = sum(float(np.mean(one.inside)) * np.count_nonzero(one.rows) for one in predictions)
+    share = inside / rows
+    text = f"{shown}; {100.0 * share:.0f} % of the rows of {len(predictions)} held-out shifts are "
+    text += "inside the 95 % band."
+    return ModelStatus.VALID if share >= _LEAST_INSIDE else ModelStatus.LIMITED, text
+
+
+def withdraw(one: Estimate, reason: str) -> Estimate:
+    """Return an estimate without its value, unless it is a design value."""
+    if one.verdict is Verdict.DESIGN or one.value is None:
+        return one
+    verdict = Verdict.NOT_IDENTIFIABLE
+    return replace(one, value=None, std_noise=None, verdict=verdict, reason=reason)
+
+
+def list_unfitted_kinds(twin: TcuTwin, shifts: Sequence[ControllerShift]) -> list[str]:
+    """List the kinds of shifts that were not fitted: their bands are too narrow."""
+    kinds = dict.fromkeys(one.kind for one in shifts)
+    return [kind for kind in kinds if kind not in twin.kinds]

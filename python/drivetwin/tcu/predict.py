@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""Prediction of a shift from its commands, its bus torque and its rows before the shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.units import RPM
+from drivetwin.errors import IdentificationError
+from drivetwin.estimation.optimize.gauss_newton import GaussNewtonSettings, minimise
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.fit.driven_term import DrivenProblem
+from drivetwin.tcu.card import ControllerCard
+from drivetwin.tcu.identify import TcuTwin
+from drivetwin.tcu.log import SPEEDS, ControllerShift
+from drivetwin.tcu.problem import build_problem, weigh
+
+DRAWS = 60
+"""Draws of the numbers from which a band is formed [count]."""
+_SEARCH = GaussNewtonSettings(ftol=0.1, kink_ftol=1.0, max_iter=8)
+_HELD = 1e-4
+"""Deviation of a shared number in a prediction over that of the fit: only numbers of the shift
+move."""
+_LEAVES, _ARRIVES = 60.0 * RPM, 40.0 * RPM
+"""Slip at the turbine from which a gear counts as left, and below which the next counts as reached
+[rad/s]."""
+
+
+@dataclass(frozen=True)
+class SlipTimes:
+    """Instants [s] from the first row of a shift: the gear before is left, the gear after is
+    reached; NaN where it is not."""
+
+    start: float
+    end: float
+
+    @property
+    def duration(self) -> float:
+        """Duration of the slip [s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedShift:
+    """Prediction of a shift: `speeds` and half widths of the 95 % `band` (n, 3) at its rows, times
+    of slip, the half width of the band of the duration, and those measured."""
+
+    shift: ControllerShift
+    speeds: FloatArray
+    band: FloatArray
+    times: SlipTimes
+    duration_band: float
+    measured: SlipTimes
+
+    @property
+    def rows(self) -> FloatArray:
+        """Rows from the change of the commanded gear on (n,)."""
+        return np.asarray(self.shift.time >= self.shift.change)
+
+    @property
+    def rms(self) -> FloatArray:
+        """Errors (3,) of the speeds from the change of the commanded gear on [rad/s]."""
+        error = (self.speeds - self.shift.speeds)[self.rows]
+        return np.asarray(np.sqrt(np.mean(error**2, axis=0)))
+
+    @property
+    def inside(self) -> FloatArray:
+        """Shares (3,) of these rows inside the band."""
+        error = np.abs(self.speeds - self.shift.speeds)[self.rows]
+        return np.asarray(np.mean(error <= self.band[self.rows], axis=0))
+
+
+def predict_shift(
+    twin: TcuTwin, shift: ControllerShift, rng: np.random.Generator
+) -> PredictedShift:
+    """Predict a shift that took no part in a fit.
+
+    Load, start and errors of the shift follow from its rows before the change of the commanded
+    gear; what those leave open is drawn from the priors.
+
+    Raises IdentificationError where the shift cannot be simulated.
+    """
+    problem, point, _ = build_problem(twin.card, [shift])
+    shared = [name for name in point.names if name in set(twin.names)]
+    places = [point.names.index(name) for name in shared]
+    fitted = [twin.get_place(name) for name in shared]
+    values = point.values.copy()
+    values[places] = twin.values[fitted]
+    covariance = _join_covariance(twin, problem, places, fitted)
+    problem, point = _hold(problem, point.replace_values(values), covariance, places)
+    before = _cut(problem, shift, twin)
+    start = minimise(before, point, settings=_SEARCH)
+    if start is None:
+        raise IdentificationError(
+            f"{shift.name} cannot be simulated with the numbers of the fit",
+            "check that the shift is one of the same vehicle and of a kind that was fitted",
+        )
+    own = np.setdiff1d(np.arange(len(point.names)), places)
+    inverse = np.linalg.inv(start.normal.information)
+    joint = covariance.copy()
+    joint[np.ix_(own, own)] = inverse[np.ix_(own, own)]
+    return _draw(twin, problem, start.point, joint, shift, rng)
+
+
+def _join_covariance(
+    twin: TcuTwin, problem: DrivenProblem, places: list[int], fitted: list[int]
+) -> FloatArray:
+    """Return the covariance (p, p) of the numbers of a prediction: of the fit, and of the priors
+    where a number took no part in it."""
+    covariance = np.linalg.inv(problem.prior.precision)
+    covariance[places, :] = covariance[:, places] = 0.0
+    covariance[np.ix_(places, places)] = twin.covariance[np.ix_(fitted, fitted)]
+    return np.asarray(covariance)
+
+
+def _hold(
+    problem: DrivenProblem, point: ParameterVector, covariance: FloatArray, places: list[int]
+) -> tuple[DrivenProblem, ParameterVector]:
+    """Hold the numbers of the fit at their values."""
+    mean, precision = problem.prior.mean.copy(), problem.prior.precision.copy()
+    mean[places] = point.values[places]
+    precision[places, :] = precision[:, places] = 0.0
+    spread = np.sqrt(np.diag(covariance)[places])
+    precision[places, places] = (_HELD * spread) ** -2.0
+    return replace(problem, prior=Prior(mean, precision)), point
+
+
+def _cut(problem: DrivenProblem, shift: ControllerShift, twin: TcuTwin) -> DrivenProblem:
+    """Compare the rows before the change of the commanded gear alone."""
+    (term,) = problem.terms
+    term = replace(term, record=term.record.cut(shift.change))
+    return weigh(replace(problem, terms=(term,)), twin.noise, None)
+
+
+def _draw(
+    twin: TcuTwin,
+    problem: DrivenProblem,
+    point: ParameterVector,
+    covariance: FloatArray,
+    shift: ControllerShift,
+    rng: np.random.Generator,
+) -> PredictedShift:
+    """Simulate the shift at a point and at draws about it."""
+    values, directions = np.linalg.eigh(covariance)
+    root = directions * np.sqrt(np.maximum(values, 0.0))
+    speeds, times = _simulate(problem, point, twin.card, shift)
+    drawn, durations = [], []
+    for _ in range(DRAWS):
+        step = root @ rng.standard_normal(len(point.names))
+        moved = np.clip(point.values + step, problem.lower, problem.upper)
+        try:
+            there, when = _simulate(problem, point.replace_values(moved), twin.card, shift)
+        except IdentificationError:
+            continue
+        drawn.append(there)
+        durations.append(when.duration)
+    sigma = np.array([twin.noise.sigma[name] for name in SPEEDS])
+    spread = np.std(drawn, axis=0) if drawn else np.full(shift.speeds.shape, np.nan)
+    known = np.array(durations)[np.isfinite(durations)]
+    return PredictedShift(
+        shift,
+        speeds,
+        Z95 * np.hypot(spread, sigma),
+        times,
+        Z95 * float(np.std(known)) if known.size > 1 else float("nan"),
+        find_slip(twin.card, shift, shift.time, shift.speeds[:, 1], shift.speeds[:, 2]),
+    )
+
+
+def _simulate(
+    problem: DrivenProblem, point: ParameterVector, card: ControllerCard, shift: ControllerShift
+) -> tuple[FloatArray, SlipTimes]:
+    """Simulate the rows (n, 3) of a shift and its times of slip."""
+    (term,) = problem.terms
+    run = term.simulate(point)
+    if run.status != "completed":
+        raise IdentificationError(
+            f"the simulation of {shift.name} ends early", "check the log at that time"
+        )
+    columns = {name: run.columns[one] for name, one in term.plant.outputs.items()}
+    rows = term.sample(point, columns).reshape(len(SPEEDS), -1).T
+    turbine, output = columns["input_speed"], columns["output_speed"]
+    return rows, find_slip(card, shift, term.record.time, turbine, output)
+
+
+def find_slip(
+    card: ControllerCard,
+    shift: ControllerShift,
+    time: FloatArray,
+    turbine: FloatArray,
+    output: FloatArray,
+) -> SlipTimes:
+    """Find the times of slip in speeds (n,) over `time` (n,) [s]."""
+    first, second = (card.ratios[name] for name in shift.gears)
+    left = (np.abs(turbine - first * output) > _LEAVES) & (time >= shift.change)
+    if not left.any():
+        return SlipTimes(float("nan"), float("nan"))
+    begin = int(np.argmax(left))
+    reached = np.abs(turbine - second * output)[begin:] < _ARRIVES
+    end = time[begin + int(np.argmax(reached))] if reached.any() else time[-1]
+    return SlipTimes(float(time[begin]), float(end))

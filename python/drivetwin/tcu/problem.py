@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""One likelihood of many shifts: shared numbers, numbers of each shift, and the common scale."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.units import RPM
+from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.fit.driven_term import DrivenProblem
+from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.tcu.card import ControllerCard
+from drivetwin.tcu.log import SPEEDS, ControllerShift
+from drivetwin.tcu.plant import build_term
+from drivetwin.tcu.unknowns import J_VEHICLE, Stated
+
+_REACH = 2.0
+"""Largest change of a number in one step of the search [standard deviations of its prior]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """Coordinates of the search: shared numbers, the scale `J_vehicle`, numbers of the shifts.
+
+    `to_absolute` (p, p) turns coordinates into those of absolute numbers: torques and inertias grow
+    with the scale.
+    """
+
+    numbers: tuple[SoughtNumber, ...]
+    stated: Mapping[str, Stated]
+    names: tuple[str, ...]
+    mean: FloatArray
+    spread: FloatArray
+    to_absolute: FloatArray
+
+    @property
+    def scale(self) -> int:
+        """Place of the scale."""
+        return self.names.index(J_VEHICLE)
+
+    @property
+    def prior(self) -> Prior:
+        """Prior of the coordinates: independent priors of the absolute numbers."""
+        weight = self.spread**-2.0
+        return Prior(self.mean, self.to_absolute.T @ (weight[:, None] * self.to_absolute))
+
+    def get_shared(self) -> list[str]:
+        """Return the names of numbers of no single shift."""
+        return [name for name in self.names if not name.startswith("shift ")]
+
+    def to_values(self, coordinates: FloatArray) -> dict[str, float]:
+        """Compute the absolute numbers by name, SI but for pressures in bar."""
+        absolute = self.mean + self.to_absolute @ (coordinates - self.mean)
+        factor = float(np.exp(coordinates[self.scale] - self.mean[self.scale]))
+        found = {}
+        for name, value in zip(self.names, absolute.tolist(), strict=True):
+            stated = self.stated[name]
+            if stated.is_positive:
+                found[name] = float(np.exp(np.clip(value, -40.0, 40.0)))
+            else:
+                found[name] = value * factor if stated.scaled else value
+        return found
+
+
+def build_problem(
+    card: ControllerCard, shifts: Sequence[ControllerShift]
+) -> tuple[DrivenProblem, ParameterVector, Coordinates]:
+    """Build the likelihood of shifts, its first point and its coordinates."""
+    terms, numbers, stated = [], {}, {}
+    for shift in shifts:
+        term, there = build_term(card, shift)
+        terms.append(term)
+        stated.update(there)
+        numbers.update({one.name: one for one in term.plant.sought})
+    shared = [name for name in numbers if not name.startswith("shift ")]
+    names = (*shared, J_VEHICLE, *(name for name in numbers if name not in set(shared)))
+    mass = card.vehicle_inertia
+    stated[J_VEHICLE] = Stated(mass.value, mass.std / mass.value, "kg*m^2")
+    sought = [numbers[name] if name != J_VEHICLE else None for name in names]
+    mean = np.array([np.log(mass.value) if one is None else one.start for one in sought])
+    spread = np.array([stated[name].std for name in names])
+    to_absolute = np.eye(len(names))
+    grows = [k for k, name in enumerate(names) if stated[name].scaled and stated[name].is_positive]
+    to_absolute[grows, names.index(J_VEHICLE)] = 1.0
+    coordinates = Coordinates(tuple(numbers.values()), stated, names, mean, spread, to_absolute)
+    limits = [(-np.inf, np.inf) if one is None else one.limits for one in sought]
+    lower, upper = np.array(limits).T
+    problem = DrivenProblem(tuple(terms), coordinates.prior, lower, upper, _REACH * spread)
+    return problem, ParameterVector(names, mean.copy()), coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class RowNoise:
+    """Noise of the rows by output: standard deviation `sigma` [rad/s], and `repeats`, the number of
+    rows that carry the information of one."""
+
+    sigma: Mapping[str, float]
+    repeats: Mapping[str, float]
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Standard deviation of a row that counts as independent, by output."""
+        return {name: one * float(np.sqrt(self.repeats[name])) for name, one in self.sigma.items()}
+
+
+LOOSE = RowNoise(
+    dict(zip(SPEEDS, (8.0 * RPM, 6.0 * RPM, 4.0 * RPM), strict=True)),
+    dict.fromkeys(SPEEDS, 8.0),
+)
+"""Noise far from the minimum: what is not yet fitted is no noise of a sensor."""
+_LEAST_SIGMA = 0.6 * RPM
+"""Least noise of a row: rounding to whole revolutions, and jitter of the task [rad/s]."""
+FLOOR, _FLOOR_REPEATS = 3.0 * RPM, 10.0
+"""Noise [rad/s] and repeats below which model errors of usual size are not excluded: residuals at
+the sensors' noise show no error of a law that other numbers have taken up."""
+_LAGS, _UNCORRELATED = 40, 0.05
+"""Rows over which a residual is correlated at most, and the correlation that counts as none."""
+
+
+def weigh(problem: DrivenProblem, noise: RowNoise, point: ParameterVector | None) -> DrivenProblem:
+    """Weigh all rows by the noise; about a point, those far off weigh less."""
+    terms = tuple(one.weigh(noise.weights, point) for one in problem.terms)
+    return replace(problem, terms=terms)
+
+
+def estimate_noise(problem: DrivenProblem, point: ParameterVector) -> RowNoise:
+    """Estimate the noise of the rows from the residuals: variance times autocorrelation time."""
+    residuals: dict[str, list[FloatArray]] = {name: [] for name in SPEEDS}
+    for term in problem.terms:
+        found = term.evaluate(point)
+        if found is None:
+            continue
+        first = 0
+        for out in term.record.outputs:
+            residuals[out.name].append(found[first : first + out.values.size])
+            first += out.values.size
+    sigma, repeats = {}, {}
+    for name, parts in residuals.items():
+        size = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        sigma[name] = max(size, _LEAST_SIGMA)
+        least = (FLOOR / sigma[name]) ** 2 * _FLOOR_REPEATS
+        repeats[name] = max(_count_repeats(parts), least)
+    return RowNoise(sigma, repeats)
+
+
+def _count_repeats(parts: Sequence[FloatArray]) -> float:
+    """Count the rows that carry the information of one independent row."""
+    products = [
+        np.mean([np.mean(one[lag:] * one[: one.size - lag]) for one in parts])
+        for lag in range(_LAGS)
+    ]
+    shares = np.array(products) / products[0]
+    below = np.flatnonzero(shares < _UNCORRELATED)
+    last = int(below[0]) if below.size else _LAGS
+    return float(max(1.0 + 2.0 * np.sum(shares[1:last]), 1.0))

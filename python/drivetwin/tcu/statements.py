@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: MIT
+"""Quantities that a log of a gearbox control determines, with verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.constants import bar
+
+from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.result.estimate import Estimate, Verdict
+from drivetwin.estimation.result.verdict import assess_with_prior
+from drivetwin.parameters import ParameterSpec
+from drivetwin.tcu.identify import FittedShifts
+from drivetwin.tcu.log import ControllerShift
+from drivetwin.tcu.predict import find_slip
+from drivetwin.tcu.unknowns import J_VEHICLE, Numbers
+from drivetwin.vehicle.spec import PriorValue
+
+METHOD = "maximum likelihood with prior"
+_STEP = 1e-3
+"""Step of a difference over a coordinate [standard deviations]."""
+
+_USUAL_PRESSURE = 3.0
+"""Pressure at which a capacity is stated where the log shows none [bar]."""
+
+Values = Mapping[str, float]
+Quantity = Callable[[Values], float]
+
+_WITHHELD = {
+    Numbers.DROP: "Only a shift that ends in slow slip without control would show it. It stays the "
+    "design value.",
+    Numbers.DEAD: "The log determines the sum of dead time and lag; see the delay.",
+    Numbers.FILL: "It depends on the assumed law of the flow; see the onset.",
+}
+"""Numbers of an element that are not stated, with the reason."""
+_DRUM = (
+    "It takes up errors of the valve and of the friction law, which act at the same time. State it "
+    "on the card."
+)
+_DAMPING = "It takes up errors of the law of the tyre, whose slip damps as well."
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Quantity as a function of the absolute numbers."""
+
+    name: str
+    unit: str
+    meaning: str
+    compute: Quantity
+
+    @property
+    def spec(self) -> ParameterSpec:
+        """Declaration of the quantity."""
+        low = -math.inf
+        return ParameterSpec(
+            self.name, self.name, self.name, self.unit, self.meaning, low, math.inf
+        )
+
+
+def state(found: FittedShifts) -> dict[str, Estimate]:
+    """Estimate the quantities of vehicle and elements with verdicts, by name."""
+    estimates = {}
+    values, aside = found.coordinates.to_values(found.point.values), _step_aside(found)
+    for one in (*_list_vehicle(), *_list_elements(found)):
+        estimates[one.name] = _judge(found, one, values, aside)
+    reasons = {"J_drum": _DRUM, "shaft_damping": _DAMPING}
+    for element in list_used(found.shifts):
+        reasons |= {f"{element}.{number}": text for number, text in _WITHHELD.items()}
+    for name, text in reasons.items():
+        spec = ParameterSpec(name, name, name, found.coordinates.stated[name].unit, "", 0.0, 1e9)
+        verdict = Verdict.NOT_IDENTIFIABLE
+        estimates[name] = Estimate(name, None, None, verdict, METHOD, reason=text, spec=spec)
+    return estimates
+
+
+def list_used(shifts: tuple[ControllerShift, ...]) -> list[str]:
+    """List the elements that change in shifts."""
+    return sorted({name for one in shifts for name in (one.off, one.on)})
+
+
+def _take(name: str, factor: float = 1.0) -> Quantity:
+    """Return the function that takes a number, times a factor."""
+    return lambda given: factor * given[name]
+
+
+def _add(first: str, second: str) -> Quantity:
+    """Return the function that adds two numbers."""
+    return lambda given: given[first] + given[second]
+
+
+def _relate(quantity: Quantity) -> Quantity:
+    """Return a quantity over the inertia of the vehicle, which no common scale moves."""
+    return lambda given: quantity(given) / given[J_VEHICLE]
+
+
+_VEHICLE = {
+    "torque_scale": ("1", "engine torque over that of the bus"),
+    "torque_offset": ("N*m", "offset of the engine torque"),
+    "J_engine": ("kg*m^2", "inertia at the engine, pump included"),
+    "J_turbine": ("kg*m^2", "inertia at the turbine"),
+    J_VEHICLE: ("kg*m^2", "vehicle inertia at the gearbox output"),
+    "converter_scale": ("1", "capacity of the converter over that of the card"),
+    "converter_overrun": ("1", "capacity in overrun over that in drive"),
+    "shaft_stiffness": ("N*m/rad", "stiffness between gearbox output and rims, at the output"),
+    "tyre_slip_stiffness": ("N*m", "torque over slip of the tyres, at the output"),
+}
+"""Units and meanings of the numbers of the vehicle that are stated as they are."""
+_SCALE_FREE = "independent of the common scale of all torques"
+
+
+def _list_vehicle() -> Iterator[Statement]:
+    """List the quantities of the vehicle."""
+    for name, (unit, meaning) in _VEHICLE.items():
+        yield Statement(name, unit, meaning, _take(name))
+    scale, engine = _relate(_take("torque_scale")), _relate(_take("J_engine"))
+    yield Statement("torque_scale/J_vehicle", "1/(kg*m^2)", _SCALE_FREE, scale)
+    yield Statement("J_engine/J_vehicle", "1", _SCALE_FREE, engine)
+    delay = _add("torque_dead_time", "torque_lag")
+    yield Statement("torque_delay", "s", "dead time and lag of the engine torque of the bus", delay)
+
+
+def _list_elements(found: FittedShifts) -> Iterator[Statement]:
+    """List the quantities of each element that changes in the shifts."""
+    for name in list_used(found.shifts):
+        at = find_used_pressure(found, name)
+        torque = partial(compute_capacity, element=name, pressure=at)
+        yield Statement(
+            f"{name}.P0",
+            "Pa",
+            "pressure at which the clutch begins to transmit",
+            _take(f"{name}.{Numbers.P0}", bar),
+        )
+        yield Statement(
+            f"{name}.delay",
+            "s",
+            "dead time and lag from the command to the pressure",
+            _add(f"{name}.{Numbers.DEAD}", f"{name}.{Numbers.LAG}"),
+        )
+        yield Statement(
+            f"{name}.slope",
+            "s/rad",
+            "change of the friction with the slip, relative",
+            _take(f"{name}.{Numbers.SLOPE}"),
+        )
+        meaning = f"torque of the element at {at:.2f} bar and 60 °C"
+        yield Statement(f"{name}.capacity", "N*m", meaning, torque)
+        yield Statement(
+            f"{name}.capacity/J_vehicle", "1/s^2", f"{meaning}, {_SCALE_FREE}", _relate(torque)
+        )
+        if any(one.on == name for one in found.shifts):
+            yield Statement(
+                f"{name}.onset",
+                "s",
+                "from the change of the commanded gear to the first torque, mean of the shifts",
+                partial(compute_onset, found=found, element=name),
+            )
+
+
+def find_used_pressure(found: FittedShifts, element: str) -> float:
+    """Find the median command [bar] of an element where the log shows its torque: while it slips
+    as it applies, and before the slip begins as it releases."""
+    parts = []
+    for one in found.shifts:
+        if element not in (one.off, one.on):
+            continue
+        slip = find_slip(found.card, one, one.time, one.speeds[:, 1], one.speeds[:, 2])
+        span = (slip.start, slip.end) if element == one.on else (one.change, slip.start)
+        rows = (one.time >= span[0]) & (one.time <= span[1])
+        parts.append(one.commands[element][rows & (one.commands[element] > 0.0)])
+    every = np.concatenate(parts)
+    return round(float(np.median(every)) / bar, 2) if every.size else _USUAL_PRESSURE
+
+
+def compute_capacity(given: Values, *, element: str, pressure: float) -> float:
+    """Compute the torque [N·m] of an element at a pressure [bar], 60 °C and vanishing slip, without
+    the drop of friction there."""
+    over = pressure - given[f"{element}.{Numbers.P0}"]
+    bent = 1.0 + given[f"{element}.{Numbers.CURVE}"] * over
+    return given[f"{element}.{Numbers.GAIN}"] * over * bent
+
+
+def compute_onset(given: Values, *, found: FittedShifts, element: str) -> float:
+    """Compute the mean time [s] from the change of the commanded gear to the first torque of an
+    element, over the shifts in which it applies."""
+    times = []
+    for term, shift in zip(found.problem.terms, found.shifts, strict=True):
+        if shift.on != element:
+            continue
+        path = term.paths["on excess"]
+        excess = path.compute(*(given[name] for name in path.of))
+        times.append(find_onset(term.record.time, excess) - shift.change)
+    return float(np.mean(times))
+
+
+def find_onset(time: FloatArray, excess: FloatArray) -> float:
+    """Find the instant [s] at which the excess of a pressure over P0 becomes positive."""
+    above = np.flatnonzero(excess > 0.0)
+    if not above.size or above[0] == 0:
+        return float(time[-1] if not above.size else time[0])
+    k = int(above[0])
+    share = -excess[k - 1] / (excess[k] - excess[k - 1])
+    return float(time[k - 1] + share * (time[k] - time[k - 1]))
+
+
+def _judge(
+    found: FittedShifts, one: Statement, values: Values, aside: list[tuple[Values, Values]]
+) -> Estimate:
+    """Judge a quantity by its standard deviation and by that of its priors.
+
+    `aside` are the numbers a step above and below along each coordinate.
+    """
+    steps = _STEP * np.sqrt(np.diag(found.covariance))
+    ends = np.array([[one.compute(side) for side in sides] for sides in aside])
+    slopes = (ends[:, 0] - ends[:, 1]) / (2.0 * steps)
+    value = one.compute(values)
+    std = math.sqrt(max(float(slopes @ found.covariance @ slopes), 0.0))
+    wide = np.linalg.inv(found.coordinates.prior.precision)
+    prior = PriorValue(value, math.sqrt(max(float(slopes @ wide @ slopes), 0.0)))
+    return assess_with_prior((one.name, value, std), prior, METHOD, declared=one.spec)
+
+
+def _step_aside(found: FittedShifts) -> list[tuple[Values, Values]]:
+    """Compute the numbers a small step above and below along each coordinate."""
+    to_values, point = found.coordinates.to_values, found.point.values
+    steps = np.diag(_STEP * np.sqrt(np.diag(found.covariance)))
+    return [(to_values(point + step), to_values(point - step)) for step in steps]
