@@ -83,6 +83,7 @@ class Code(StrEnum):
     NULL_DIRECTIONS = auto()
     AT_BOUND = auto()
     RESIDUAL_COLOURED = auto()
+    RESIDUAL_ORDER = auto()
     RESIDUAL_CORRELATED = auto()
     INPUT_NOISE_OMITTED = auto()
     SIMULATION_MISSES = auto()

@@ -18,6 +18,7 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
     check_weighting,
 )
+from drivetwin.estimation.likelihood.diagnostics.shaft_orders import find_order
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
@@ -413,6 +414,7 @@ def _collect_findings(
     known = np.diag((np.arange(len(sizes)) >= len(sizes) - fixed).astype(float))
     return (
         *check_residuals(state, labels),
+        *find_order(state.problem, state.normal.residuals),
         *check_weighting(state, labels),
         *report_null_directions(minimum.normal.data + known, sizes, shown, "their priors"),
     )

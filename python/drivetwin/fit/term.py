@@ -58,6 +58,11 @@ class NetworkTerm:
         return self.plant.label
 
     @property
+    def speeds(self) -> list[str]:
+        """Names of the compared speeds."""
+        return [name for name, one in self.plant.outputs.items() if one[0] == "speed"]
+
+    @property
     def inputs(self) -> Mapping[str, Signal]:
         """Measured inputs by the names of findings."""
         return self.record.inputs

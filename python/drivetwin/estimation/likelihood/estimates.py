@@ -27,6 +27,7 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
     check_weighting,
 )
+from drivetwin.estimation.likelihood.diagnostics.shaft_orders import find_order
 from drivetwin.estimation.likelihood.effects.causes import (
     compute_doubt,
     describe_cause,
@@ -193,6 +194,7 @@ def build_estimates(
     likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
     disagreements = (
         *check_residuals(fit, labels, corrected.residuals, *likeliest),
+        *find_order(fit.problem, corrected.residuals),
         *check_weighting(fit, labels),
         *(() if correction is not None else (report(Code.EFFECTS_OMITTED),)),
         *withdrawn,

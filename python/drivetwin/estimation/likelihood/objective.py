@@ -88,6 +88,10 @@ class Term(Protocol):
     def inputs(self) -> Mapping[str, Signal]:
         """Measured inputs by the names of findings."""
 
+    @property
+    def speeds(self) -> list[str]:
+        """Names of the compared speeds."""
+
     def evaluate(self, point: ParameterVector) -> FloatArray | None:
         """Compute the residual (n,) at `point`; None if the simulation fails."""
 

@@ -82,6 +82,11 @@ class ShiftTerm:
         return self.structure.label
 
     @property
+    def speeds(self) -> list[str]:
+        """Names of the compared speeds."""
+        return [one.name for one in self.record.outputs if one.name.endswith("speed")]
+
+    @property
     def inputs(self) -> dict[str, Signal]:
         """Measured inputs by the names of findings."""
         pressures = self.record.pressures.items()
