@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any
 
@@ -17,7 +18,10 @@ def convert_nonfinite(value: object) -> object:
 
 
 def to_plain_values(value: Any) -> Any:
-    """Reduce settings to JSON and TOML types: enums to values, arrays to lists, NaN to None."""
+    """Reduce values to JSON and TOML types: enums to values, arrays to lists, NaN to None, and
+    dataclasses to their fields by name."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = {one.name: getattr(value, one.name) for one in fields(value)}
     if isinstance(value, Enum):
         return to_plain_values(value.value)
     if isinstance(value, np.ndarray | np.generic):

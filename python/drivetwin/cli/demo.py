@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,102 +78,67 @@ def demo(request: Demonstrate) -> Outcome:
     note = "± is the half width of the 95 % interval; the paper's method states none for its grids."
     return Outcome(
         [_build_table(rows, scenario), TextBlock(note)],
-        {"parameters": [row.to_document() for row in rows], "log": log, "report": report},
+        {"parameters": rows, "log": log, "report": report},
         lines=[f"log, card and truth: {log.parent}", f"report: {report}"],
     )
 
 
-@dataclass(frozen=True)
-class _Found:
-    """Value and total 95 % interval of one method; None if not estimated."""
+def _compare(truth: Truth, found: Mapping[Method, Identification]) -> list[dict[str, Any]]:
+    """List all true parameters that some method estimates, then friction over slip.
 
-    value: float | None = None
-    interval: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class _Row:
-    """One quantity: id, true value, what each method found, SI unit."""
-
-    id: str
-    truth: float
-    found: Mapping[Method, _Found]
-    unit: str
-
-    def to_document(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "id": self.id,
-            "truth": self.truth,
-            "unit": self.unit,
-            **{
-                method.value: {"value": one.value, "ci95_total": one.interval}
-                for method, one in self.found.items()
-            },
-        }
-
-
-def _compare(truth: Truth, found: Mapping[Method, Identification]) -> list[_Row]:
-    """Rows for all true parameters that some method answers, then friction over slip."""
+    Each has the true value, the SI unit, and by method the value with its total 95 % interval.
+    """
     import numpy as np
 
     from drivetwin.parameters import get_parameter_spec
 
-    rows = [
-        _Row(
-            key,
-            value,
-            {m: _get_estimate(one, key) for m, one in found.items()},
-            get_parameter_spec(key).unit,
-        )
+    rows: list[dict[str, Any]] = [
+        {"id": key, "truth": value, "unit": get_parameter_spec(key).unit}
+        | {method.value: _get_estimate(one, key) for method, one in found.items()}
         for key, value in truth.parameters.items()
         if any(key in one.estimates for one in found.values())
     ]
     for element, law in truth.friction.items():
         for slip in _SLIPS:
-            points = {method: _get_friction(one, element, slip) for method, one in found.items()}
-            if any(point.value is not None for point in points.values()):
-                rows.append(
-                    _Row(
-                        f"mu.{element} @{slip:g}", float(law.evaluate(np.array(slip))), points, "1"
-                    )
-                )
+            points = {m.value: _get_friction(one, element, slip) for m, one in found.items()}
+            if any(point["value"] is not None for point in points.values()):
+                mu = float(law.evaluate(np.array(slip)))
+                rows.append({"id": f"mu.{element} @{slip:g}", "truth": mu, "unit": "1"} | points)
     return rows
 
 
-def _get_estimate(found: Identification, key: str) -> _Found:
-    estimate = found.estimates.get(key)
-    return _Found() if estimate is None else _Found(estimate.value, estimate.ci95_total)
+def _get_estimate(found: Identification, key: str) -> dict[str, Any]:
+    one = found.estimates.get(key)
+    return {"value": one and one.value, "ci95_total": one and one.ci95_total}
 
 
-def _get_friction(found: Identification, element: str, slip: float) -> _Found:
+def _get_friction(found: Identification, element: str, slip: float) -> dict[str, Any]:
     """The curve of an element at one slip; nothing outside the slip range seen."""
     import numpy as np
 
     curve = found.friction.get(element)
     if curve is None or not curve.slip[0] <= slip <= curve.slip[-1]:
-        return _Found()
+        return {"value": None, "ci95_total": None}
     mu, low, high = (
         float(np.interp(slip, curve.slip, values))
         for values in (curve.mu, curve.mu_lo, curve.mu_hi)
     )
-    return _Found(mu, (low, high) if np.isfinite(high - low) else None)
+    return {"value": mu, "ci95_total": (low, high) if np.isfinite(high - low) else None}
 
 
-def _build_table(rows: list[_Row], scenario: ScenarioName) -> TableBlock:
+def _build_table(rows: list[dict[str, Any]], scenario: ScenarioName) -> TableBlock:
     """Truth, and value, interval and deviation of both methods."""
-
     lines = []
     for row in rows:
-        paper, default = row.found[Method.PAPER], row.found[DEFAULT_METHOD]
-        value, interval, unit = format_estimate(default.value, default.interval, row.unit)
+        truth, unit = row["truth"], row["unit"]
+        paper, default = row[Method.PAPER.value], row[DEFAULT_METHOD.value]
+        value, interval, shown = format_estimate(default["value"], default["ci95_total"], unit)
         lines.append(
             (
-                row.id,
-                format_estimate(row.truth, None, row.unit)[0],
-                format_estimate(paper.value, None, row.unit)[0],
-                format_deviation(paper.value, row.truth),
-                *(value, interval, format_deviation(default.value, row.truth), unit),
+                *(row["id"], format_estimate(truth, None, unit)[0]),
+                format_estimate(paper["value"], None, unit)[0],
+                format_deviation(paper["value"], truth),
+                *(value, interval, format_deviation(default["value"], truth), shown),
             )
         )
     numbers = ("truth", "paper", "off %", DEFAULT_METHOD.value, "± 95 %", "off %")

@@ -94,12 +94,12 @@ def _describe_drive(motion: DriveRun) -> dict[str, Any]:
                 "end": each.action.end,
                 "break_away": each.break_away,
                 "lock": each.lock,
-                "shaft_torque": list(each.shaft_torque),
-                "elements": [vars(work) for work in each.work],
+                "shaft_torque": each.shaft_torque,
+                "elements": each.work,
             }
             for each in motion.maneuvers
         ],
         "friction_work": dict(motion.work),
-        "energy": vars(motion.audit),
-        "warnings": list(motion.warnings),
+        "energy": motion.audit,
+        "warnings": motion.warnings,
     }

@@ -77,7 +77,7 @@ def shifts(request: DetectShifts) -> Outcome:
     findings = (*recording.findings, *find_causes(recording, card))
     if request.output is not None and found.shifts:
         _write_page(request.output, found.shifts, recording, comparison)
-    compared = {"comparison": [asdict(one) for one in comparison]} if request.against else {}
+    compared = {"comparison": comparison} if request.against else {}
     labels = make_shift_labels(found.shifts)
     blocks: list[Block] = [
         build_phase_table(*one) for one in zip(labels, found.shifts, strict=True)
@@ -164,11 +164,11 @@ def _describe_shifts(
 
     return {
         "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
-        "summary": [asdict(one) for one in summarize_shifts(found.shifts)],
-        "rejected": [asdict(one) for one in found.rejected],
-        "lock_ups": [asdict(one) for one in closings],
+        "summary": summarize_shifts(found.shifts),
+        "rejected": found.rejected,
+        "lock_ups": closings,
         "resonances": [_convert_resonance(*pair) for pair in seen.swings],
-        "held_gears": [asdict(one) for one in seen.gears],
+        "held_gears": seen.gears,
     }
 
 

@@ -72,6 +72,7 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
     """Simulate every shift of a log by a twin, and write tables and pages."""
     from drivetwin._util.atomic import write_text
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
+    from drivetwin.files.records import dump_findings
     from drivetwin.report.sections.findings import build_findings_section
     from drivetwin.report.sections.fits import build_fit_table
     from drivetwin.shifts.detect import require_shifts
@@ -101,13 +102,21 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
     for run in runs:
         blocks.append(build_fit_table(run.fit, f"Shift {run.shift.name}: {run.status}"))
         blocks += build_findings_section(run.findings).blocks
-    return Outcome(blocks, {"shifts": [_to_document(run) for run in runs]}, request.output)
+    listed = [
+        {
+            "from": run.shift.start_gear,
+            "to": run.shift.end_gear,
+            "status": run.status,
+            "fit": run.fit,
+            "findings": dump_findings(run.findings),
+        }
+        for run in runs
+    ]
+    return Outcome(blocks, {"shifts": listed}, request.output)
 
 
 def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
     """Simulate a recording by a fitted model with the start adapted, and write pages."""
-    from dataclasses import asdict
-
     from drivetwin._util.atomic import write_text
     from drivetwin.cli.fit import read_recordings
     from drivetwin.fit.fit import predict_recording
@@ -134,8 +143,7 @@ def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
         *build_prediction_blocks(found, request.log.name),
         *build_findings_section(findings).blocks,
     ]
-    fit = {name: asdict(one) for name, one in found.agreement.items()}
-    return Outcome(blocks, {"fit": fit, "chi2": found.chi2}, request.output)
+    return Outcome(blocks, {"fit": found.agreement, "chi2": found.chi2}, request.output)
 
 
 def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) -> None:
@@ -166,18 +174,3 @@ def _apply_parameters(twin: Twin, parameters: Path, template: Path | None) -> Tw
     if content.skipped:
         print_line(f"neither number nor curve: {', '.join(content.skipped)}", stderr=True)
     return update.twin
-
-
-def _to_document(run: Validation) -> dict[str, object]:
-    from drivetwin.files.records import dump_findings
-
-    return {
-        "from": run.shift.start_gear,
-        "to": run.shift.end_gear,
-        "status": run.status,
-        "fit": {
-            signal: {phase: vars(fit) for phase, fit in phases.items()}
-            for signal, phases in run.fit.items()
-        },
-        "findings": dump_findings(run.findings),
-    }
