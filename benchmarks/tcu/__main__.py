@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""Held-out shifts and coverage of controller logs: `python -m benchmarks.tcu GENERATOR`.
+
+GENERATOR is a folder with `gen.py` and `gen.c` of an independent simulator of such logs; `gcc`
+compiles it beside the made logs. Identifies COUNT vehicles of 20 shifts from seed FIRST on, every
+fifth shift held out, and prints the tables. With `--rows FILE` vehicles are appended to a file, and
+those in it are not made again. `--clean` leaves out the errors that the plant has no law for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.tcu.made import Generator
+from benchmarks.tcu.study import format_tables, study_vehicle
+
+
+def main() -> int:
+    """Run the study."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("generator", type=Path, help="folder of the simulator")
+    parser.add_argument("first", type=int, nargs="?", default=0, help="first seed")
+    parser.add_argument("count", type=int, nargs="?", default=20, help="vehicles")
+    parser.add_argument("--rows", type=Path, help="file of vehicles")
+    parser.add_argument("--clean", action="store_true", help="vehicles that obey the plant")
+    options = parser.parse_args()
+    file = options.rows
+    known = file.read_text(encoding="utf-8").splitlines() if file and file.exists() else []
+    vehicles = {one["seed"]: one for one in map(json.loads, known)}
+    wanted = range(options.first, options.first + options.count)
+    with tempfile.TemporaryDirectory() as folder:
+        generator = Generator.compile(options.generator, Path(folder), rough=not options.clean)
+        for seed in wanted:
+            if seed in vehicles:
+                continue
+            vehicles[seed] = study_vehicle(generator, seed)
+            if file:
+                with file.open("a", encoding="utf-8") as rows:
+                    rows.write(json.dumps(vehicles[seed]) + "\n")
+    sys.stdout.write(format_tables([vehicles[seed] for seed in wanted]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
