@@ -33,7 +33,8 @@ _FEWEST = 20
 """Fewest samples that show how a channel moves."""
 _WITHOUT = (
     "Without them 'drivetwin identify --bus' estimates the quantities that speeds and engine "
-    "torque determine"
+    "torque determine; of an automatic with converter, 'drivetwin identify' takes the commands "
+    "themselves with a card that has [[changes]], see 'drivetwin schema tcu-card'"
 )
 """Remedy where no pressure was recorded."""
 
