@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import pickle
 from math import sqrt
 
 import numpy as np
@@ -71,3 +72,12 @@ def test_the_starts_are_compared_and_the_best_is_counted() -> None:
     found = fit_log(FOUND)
     assert 1 <= found.agreeing <= len(found.starts)
     assert min(one.cost for one in found.starts) < np.inf
+
+
+def test_a_result_is_stored_and_simulates_as_before() -> None:
+    found = fit_log(FOUND)
+    again = pickle.loads(pickle.dumps(found))
+    assert again.values == found.values
+    (one,), (other,) = again.simulate(), found.simulate()
+    for output, column in other.columns.items():
+        assert np.array_equal(one.columns[output], column)

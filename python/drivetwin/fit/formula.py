@@ -6,7 +6,8 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple, cast
 
 from drivetwin.errors import InputError, suggest_spelling
@@ -76,11 +77,13 @@ def parse_formula(name: str, text: str, known: Collection[str]) -> Formula:
         what = f"{name}: {text!r} is no formula: {getattr(error, 'msg', error)}"
         raise InputError(what, _REMEDY) from None
 
-    def compute(*values: float) -> float:
-        by_name = dict(zip(used, values, strict=True))
-        return _evaluate(tree, lambda node: by_name[_spell(node)])
+    return Formula(tuple(used), partial(_compute, tree, tuple(used)))
 
-    return Formula(tuple(used), compute)
+
+def _compute(tree: ast.expr, of: Sequence[str], *values: float) -> float:
+    """Compute a formula of numbers with the names `of`."""
+    by_name = dict(zip(of, values, strict=True))
+    return _evaluate(tree, lambda node: by_name[_spell(node)])
 
 
 def _evaluate(node: ast.expr, read: Callable[[ast.expr], float]) -> float:

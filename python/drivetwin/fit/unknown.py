@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, Field, PlainSerializer
@@ -129,12 +130,8 @@ class PlacedNumber:
 
     def make_settings(self, of: tuple[str, ...], compute: Callable[..., float]) -> list[Setting]:
         """Return the numbers on which it acts, by a function of the unknowns `of`."""
-
-        def scale(factor: float) -> Callable[..., float]:
-            return lambda *values: factor * compute(*values)
-
         return [
-            Setting(path, of, compute if factor == 1.0 else scale(factor))
+            Setting(path, of, compute if factor == 1.0 else partial(_scale, factor, compute))
             for path, factor in self.factors.items()
         ]
 
@@ -148,7 +145,7 @@ class SoughtNumber(PlacedNumber):
     @property
     def settings(self) -> list[Setting]:
         """Numbers on which it acts."""
-        return self.make_settings((self.name,), lambda value: value)
+        return self.make_settings((self.name,), _take)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -157,6 +154,14 @@ class SoughtNumber(PlacedNumber):
         if not self.is_positive:
             return low, high
         return (math.log(low) if low > 0.0 else -math.inf), math.log(high)
+
+
+def _take(value: float) -> float:
+    return value
+
+
+def _scale(factor: float, compute: Callable[..., float], *values: float) -> float:
+    return factor * compute(*values)
 
 
 def resolve_unknown(

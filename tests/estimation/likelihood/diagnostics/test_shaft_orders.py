@@ -14,7 +14,6 @@ from drivetwin.fit.result import ModelFit
 from drivetwin.fit.synthesize import ModelName
 from tests.support.fits import fit_log, make_log
 
-
 NAME = "wheel speed"
 
 
