@@ -21,12 +21,11 @@ from drivetwin.findings import (
     Code,
     Finding,
     Number,
-    Severity,
     list_fields,
     load_catalogue,
+    render,
     report,
     select_warnings,
-    sort_by_severity,
 )
 from tests.support.repeats import mark_repeats
 from tools.findings_page import PAGE, ROOT, make_anchor, write_page
@@ -95,16 +94,22 @@ def test_a_finding_shows_place_subject_numbers_and_remedy() -> None:
     assert text.startswith("J_out: the vehicle card has 1.00 ± 0.10 kg·m², the log gives 2.00 ±")
 
 
-def test_sorted_by_severity_errors_come_first_and_equals_keep_their_order() -> None:
-    error, first, second, info = (
-        report(Code.LIKELIHOOD_FAILED, why="x"),
-        report(Code.STUCK, "a", places="1 s"),
-        report(Code.STUCK, "b", places="1 s"),
-        report(Code.NO_SENSOR_TOLERANCES),
-    )
-    assert sort_by_severity([info, first, second, error]) == [error, first, second, info]
-    assert select_warnings([info, first]) == (first,)
-    assert info.severity is Severity.INFO
+def test_equal_findings_are_one_text_with_their_number_and_the_worst() -> None:
+    """Of contradictions the least probable; of equal texts in several files the first."""
+    shifts = [
+        report(Code.BUS_SHIFTS_CONTRADICT, shift=f"shift {k}", quantity="f_d", p=10.0**-k)
+        for k in (2, 4, 3, 2.5, 2.2)
+    ]
+    (text,) = render(shifts)
+    assert text.startswith("Shift 4 contradicts" if text[0] == "S" else "shift 4 contradicts")
+    assert text.endswith("(5 of this kind; also shift 2, shift 3, shift 2.5 and 1 more)")
+    files = [report(Code.NO_SENSOR_TOLERANCES).set_file(name) for name in ("a.csv", "b.csv")]
+    (text,) = render(files)
+    assert text.startswith("a.csv: ")
+    assert text.endswith("(2 of this kind; also b.csv)")
+    different = [report(Code.STUCK, name, places=f"at {name}") for name in "ab"]
+    assert render(different) == tuple(one.text for one in different)
+    assert select_warnings([*files, *different]) == tuple(different)
 
 
 STATED = """

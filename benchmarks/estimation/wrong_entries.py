@@ -18,7 +18,7 @@ from benchmarks.estimation.validity import judge
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
-from drivetwin.findings import Code, sort_by_severity
+from drivetwin.findings import Code, Severity
 from drivetwin.logs.quality.consistency_checks import check_final_drive
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
@@ -168,7 +168,12 @@ def check_entry(number: int, seed: int) -> str:
     row = judge(seed, "", 0.0, found, made.recorded.truth.parameters)
     far = [f"{name} {z:+.0f}" for name, z in row.identified.items() if abs(z) > FAR]
     suspects = [one.text for one in found.findings if one.code is Code.CARD_SUSPECT]
-    texts = suspects or [one.text for one in sort_by_severity(found.findings)]
+    texts = suspects or [
+        one.text
+        for one in sorted(
+            found.findings, key=lambda one: [*Severity].index(one.severity), reverse=True
+        )
+    ]
     place = next((k for k, text in enumerate(texts, 1) if re.search(entry.named, text)), 0)
     return (
         f"{entry.name:36s} {found.status.value:17s} identified {len(row.identified)}, far {far}, "

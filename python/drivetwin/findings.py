@@ -385,12 +385,6 @@ def select_warnings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(one for one in findings if one.severity is not Severity.INFO)
 
 
-def sort_by_severity(findings: Iterable[Finding]) -> list[Finding]:
-    """Sort findings from errors to information; equal ones keep their order."""
-    order = list(reversed(Severity))
-    return sorted(findings, key=lambda one: order.index(one.severity))
-
-
 _LISTED = 3
 """Number of equal findings that are named beside the worst."""
 

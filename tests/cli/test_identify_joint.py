@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.cli.identify_joint import parse_holdouts
+from drivetwin.cli.identify import parse_holdouts
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.errors import InputError

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from drivetwin.cli.output import print_findings
+from drivetwin.cli.output import print_blocks
 from drivetwin.files.records import FindingRecord
 from drivetwin.findings import Code, make_row, report
-from drivetwin.report.blocks import TableBlock
-from drivetwin.report.sections.findings import build_findings_section
+from drivetwin.report.blocks import TableBlock, build_findings_section
 
 ROWS = (
     make_row(shift="2-3", channel="output torque", source="engine torque", size=7.4),
@@ -34,7 +33,7 @@ def test_rows_survive_a_result_file() -> None:
 
 
 def test_terminal_and_report_show_the_table(capsys: pytest.CaptureFixture[str]) -> None:
-    print_findings([FOUND])
+    print_blocks(build_findings_section([FOUND]).blocks)
     printed = capsys.readouterr().out
     assert "pressure of B3" in printed
     assert max(map(len, printed.splitlines())) <= 80

@@ -115,4 +115,4 @@ def test_a_folder_without_a_result_is_refused_with_what_would_be_one(
         name, *rest = command
         order = [name, str(tmp_path), *rest]
         assert main(order) == 2
-        assert "result.json, bus.json, fit.json or twin.toml" in capsys.readouterr().err
+        assert "there is no result.json, bus.json, fit.json" in capsys.readouterr().err

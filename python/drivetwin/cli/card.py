@@ -14,7 +14,7 @@ from drivetwin.cli.command_group import CommandGroup
 from drivetwin.cli.output import show_step, to_error_document
 from drivetwin.errors import CardError, DrivetwinError
 from drivetwin.findings import Code, Finding, report, select_warnings
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -40,7 +40,7 @@ def check(request: CheckCard) -> Outcome:
     cannot be read.
     """
     from drivetwin.files.records import dump_findings
-    from drivetwin.report.sections.findings import build_findings_section
+    from drivetwin.report.blocks import build_findings_section
     from drivetwin.vehicle.card import load_card
 
     try:

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 from drivetwin._util.request import REQUIRED, Request, flag, option, output_file, spell_option
 from drivetwin.cli.arguments import find_mapping, mapping_option
 from drivetwin.cli.output import (
-    print_findings,
+    print_blocks,
     print_json,
     print_line,
     print_paragraph,
     show_step,
 )
 from drivetwin.errors import DrivetwinError, InputError, Where
+from drivetwin.report.blocks import build_findings_section
 from drivetwin.vehicle.card_fields import list_single_options
 
 if TYPE_CHECKING:
@@ -211,6 +212,6 @@ def _report(
             "next: fill them in, or state these options and --force; confirm entries with 'guess:'"
         )
         return
-    print_findings(findings)
+    print_blocks(build_findings_section(findings).blocks)
     beside = "" if log is None else f" {log}"
     print_line(f"next: drivetwin card check {output}{beside}")

@@ -13,8 +13,7 @@ from drivetwin.cli.arguments import REPORT
 from drivetwin.cli.synth import Bench
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.report.blocks import Column, TableBlock, TextBlock, make_table
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Column, Outcome, TableBlock, TextBlock, make_table
 
 if TYPE_CHECKING:
     from drivetwin.dyno.truth import Truth

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from drivetwin._util.request import Request, argument, option, output_folder
 from drivetwin.cli.arguments import GEARBOX_HELP
 from drivetwin.cli.output import show_step
-from drivetwin.report.blocks import TextBlock, Tone, make_notes
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome, TextBlock, Tone, make_notes
 
 if TYPE_CHECKING:
     from drivetwin.drive import DriveRun

@@ -15,8 +15,7 @@ from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.parameters import get_parameter_spec
-from drivetwin.report.blocks import Block, Cell, TableBlock, make_table
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Block, Cell, Outcome, TableBlock, make_table
 
 if TYPE_CHECKING:
     from drivetwin.cli.identify_run import IdentifiedLog

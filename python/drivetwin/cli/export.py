@@ -13,8 +13,7 @@ from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError
 from drivetwin.export.targets import Target
 from drivetwin.export.write import ExportedModel, ExportOptions, write_content, write_export
-from drivetwin.report.blocks import TextBlock
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome, TextBlock
 
 if TYPE_CHECKING:
     from drivetwin.report.results import MadeResult

@@ -25,8 +25,7 @@ from drivetwin.cli.command_group import CommandGroup
 from drivetwin.cli.output import NOT_CONFIRMED, print_blocks, print_line, show_step
 from drivetwin.errors import INTERRUPTED, InputError
 from drivetwin.fleet.options import FleetOptions
-from drivetwin.report.blocks import Tone, VerdictBlock, make_notes, make_table
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome, Tone, VerdictBlock, make_notes, make_table
 
 if TYPE_CHECKING:
     from drivetwin.fleet.events import Summary

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from drivetwin._util.request import Request, argument, option, output_file
 from drivetwin.cli.arguments import GEARBOX_HELP
-from drivetwin.report.blocks import Block, Tone, make_notes
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Block, Outcome, Tone, make_notes
 
 if TYPE_CHECKING:
     from drivetwin.gearbox import Gearbox

@@ -23,7 +23,7 @@ from drivetwin.cli.atomic_outputs import write_atomically
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome
 from drivetwin.vehicle.effects import parse_priors
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from drivetwin.cli.arguments import REPORT, TWIN
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.cli.identify import Identify

@@ -15,8 +15,7 @@ from drivetwin.cli.arguments import find_mapping, log_argument, mapping_option
 from drivetwin.cli.output import print_line, show_step, to_error_document
 from drivetwin.errors import DrivetwinError, UnitError
 from drivetwin.findings import Finding
-from drivetwin.report.blocks import Block, TextBlock, make_notes
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Block, Outcome, TextBlock, make_notes
 from drivetwin.report.sections.inputs import build_column_table
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ def inspect(request: Inspect) -> Outcome:
 
 def _build_seen(seen: _Seen, draft: Draft, name: str) -> Iterator[Block]:
     """Build the columns of a log, notes, open units with their proposals, and findings."""
-    from drivetwin.report.sections.findings import build_findings_section
+    from drivetwin.report.blocks import build_findings_section
 
     found = seen.survey
     shown = _select_shown(found.columns)

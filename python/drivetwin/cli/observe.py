@@ -13,8 +13,7 @@ from drivetwin._util.request import output_file
 from drivetwin.cli.arguments import TwinLogInput, read_twin_log
 from drivetwin.cli.output import show_step
 from drivetwin.errors import DamagedChannelError
-from drivetwin.report.blocks import Tone, make_notes
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome, Tone, make_notes
 
 if TYPE_CHECKING:
     from drivetwin.logs.raw import RawChannel

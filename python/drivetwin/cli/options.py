@@ -17,7 +17,7 @@ from drivetwin._util.atomic import protect_files, remove_unfinished
 from drivetwin._util.outputs import Output, lock_outputs
 from drivetwin._util.request import Argument, FileRole, Request, get_arguments, spell_option
 from drivetwin.cli.output import deliver
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome
 
 Command = Callable[..., Any]
 """Function of a request that returns an `Outcome` or yields several. One that prints by itself

@@ -19,8 +19,7 @@ from drivetwin.findings import Finding
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from drivetwin.report.blocks import Block
-    from drivetwin.report.outcome import Outcome
+    from drivetwin.report.blocks import Block, Outcome
 
 NOT_CONFIRMED = 3
 """Exit code of a result that is not confirmed, with --strict."""
@@ -114,13 +113,6 @@ def print_blocks(blocks: Iterable[Block]) -> None:
     from drivetwin.report import text
 
     text.print_blocks(make_console(), blocks)
-
-
-def print_findings(findings: Iterable[Finding]) -> None:
-    """Print findings with their tables by severity, the gravest first."""
-    from drivetwin.report.sections.findings import build_findings_section
-
-    print_blocks(build_findings_section(tuple(findings)).blocks)
 
 
 def print_json(value: Mapping[str, Any]) -> None:

@@ -8,8 +8,7 @@ from dataclasses import asdict
 from drivetwin._util.request import REQUIRED, Request, argument, option
 from drivetwin.cli.arguments import GEARBOX_HELP
 from drivetwin.errors import InputError
-from drivetwin.report.blocks import Tone, make_notes
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome, Tone, make_notes
 
 
 class Reduce(Request, command="reduce"):

@@ -12,7 +12,7 @@ from drivetwin._util.request import Request, argument, output_file
 from drivetwin.cli.arguments import mapping_option, read_twin_log
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.report.find_reports import Trial

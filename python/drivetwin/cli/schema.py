@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from drivetwin._util.request import Request, argument, build_request_schema, option
 from drivetwin.files.schemas import FileKind, build_json_schema
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome
 
 
 class PrintSchema(Request, command="schema"):

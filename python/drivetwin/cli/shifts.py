@@ -14,8 +14,7 @@ from drivetwin._util.request import FileRole, input_file, output_file
 from drivetwin.cli.arguments import LogInput, find_mapping
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
-from drivetwin.report.blocks import Block, TableBlock, TextBlock, make_notes, make_table
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Block, Outcome, TableBlock, TextBlock, make_notes, make_table
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
@@ -53,7 +52,7 @@ def shifts(request: DetectShifts) -> Outcome:
     With a card of the ratios alone, list the shifts of a bus log and their phases.
     """
     from drivetwin.files.records import dump_findings
-    from drivetwin.report.sections.findings import build_findings_section
+    from drivetwin.report.blocks import build_findings_section
     from drivetwin.report.sections.summary import build_phase_table
     from drivetwin.report.whole_drive import build_comparison_table
     from drivetwin.shifts.causes import find_causes
@@ -267,8 +266,8 @@ def show_bus_shifts(log: Path, vehicle: Path, channels: Path | None) -> Outcome:
     from drivetwin.files.bus_file import build_shift_record
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.read import read_log
+    from drivetwin.report.blocks import build_findings_section
     from drivetwin.report.bus import build_phase_table
-    from drivetwin.report.sections.findings import build_findings_section
     from drivetwin.vehicle.ratio_card import load_ratio_card
 
     card = load_ratio_card(vehicle)

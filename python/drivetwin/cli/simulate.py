@@ -13,8 +13,7 @@ from drivetwin.cli.arguments import MODEL, TwinLogInput, read_twin_log, result_a
 from drivetwin.cli.output import print_line, show_step
 from drivetwin.errors import InputError, Where
 from drivetwin.export.targets import DEFAULT_STEP, InputKind
-from drivetwin.report.blocks import Block
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Block, Outcome
 
 if TYPE_CHECKING:
     from drivetwin.estimation.result.validation import Validation
@@ -73,7 +72,7 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
     from drivetwin._util.atomic import write_text
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
     from drivetwin.files.records import dump_findings
-    from drivetwin.report.sections.findings import build_findings_section
+    from drivetwin.report.blocks import build_findings_section
     from drivetwin.report.sections.fits import build_fit_table
     from drivetwin.shifts.detect import require_shifts
     from drivetwin.validation.command_pressures import replace_pressures
@@ -121,8 +120,8 @@ def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
     from drivetwin.cli.fit import read_recordings
     from drivetwin.fit.fit import predict_recording
     from drivetwin.fit.model_file import read_model
+    from drivetwin.report.blocks import build_findings_section
     from drivetwin.report.fit import build_prediction_blocks, render_prediction
-    from drivetwin.report.sections.findings import build_findings_section
 
     allowed = {"twin", "log", "output"}
     request.refuse_stated(

@@ -11,7 +11,7 @@ from drivetwin._util.request import Request, option, output_file
 from drivetwin.cli.atomic_outputs import write_atomically, write_texts
 from drivetwin.cli.output import show_step
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.report.outcome import Outcome
+from drivetwin.report.blocks import Outcome
 from drivetwin.vehicle.effects import EffectId
 
 if TYPE_CHECKING:

@@ -6,12 +6,15 @@ A result is converted to blocks once; each medium renders blocks and knows no ty
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.display_units import format_significant
+from drivetwin.errors import DrivetwinError
+from drivetwin.findings import Finding, Severity, render
 from drivetwin.report.figure import Figure
 
 if TYPE_CHECKING:
@@ -211,3 +214,40 @@ def make_number(text: str, note: str = "", *, secondary: bool = False) -> Cell:
 def make_badge(text: str, tone: Tone, note: str = "") -> Cell:
     """Make the cell of a verdict, drawn as a coloured label."""
     return Cell(text, badge=True, tone=tone, note=note)
+
+
+_SEVERITIES = (
+    (Severity.ERROR, "Errors", Tone.BAD),
+    (Severity.WARNING, "Warnings", Tone.DOUBTFUL),
+    (Severity.INFO, "Information", Tone.PLAIN),
+)
+
+
+def build_findings_section(findings: Sequence[Finding]) -> Section:
+    """Findings by severity, errors first, each group with the tables of its findings."""
+    blocks: list[Block] = []
+    for severity, heading, tone in _SEVERITIES:
+        alike = [one for one in findings if one.severity is severity]
+        blocks += make_notes(heading, render(alike), tone)
+        blocks += [make_table(one.cause, one.heads, one.cells) for one in alike if one.rows]
+    intro = "Remarks on log, vehicle card and fit, with cause and remedy."
+    return Section("findings", "Findings", intro, blocks)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Result of a command.
+
+    `blocks` are for people, `lines` below them are never wrapped; `document` is for programs;
+    `files` were written. `is_confirmed` is false
+    for a result that `--strict` refuses. `fault` is the error of a part, beside which the rest was
+    done. `is_json` is true where the document is the result for people too.
+    """
+
+    blocks: Sequence[Block] = ()
+    document: Mapping[str, Any] | None = None
+    files: Sequence[Path] = ()
+    is_confirmed: bool = True
+    fault: DrivetwinError | None = None
+    lines: Sequence[str] = ()
+    is_json: bool = False

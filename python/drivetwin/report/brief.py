@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from drivetwin.estimation.identification import Identification
-from drivetwin.report.blocks import Block, TextBlock
+from drivetwin.report.blocks import Block, TextBlock, build_findings_section
 from drivetwin.report.model_verdict import build_verdict_block, explain_identification
-from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.identifiability import build_suggestion_blocks
 from drivetwin.report.sections.parameters import build_parameter_blocks

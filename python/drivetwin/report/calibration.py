@@ -28,6 +28,7 @@ from drivetwin.report.blocks import (
     Tile,
     TilesBlock,
     Tone,
+    build_findings_section,
     make_badge,
     make_notes,
     make_number,
@@ -40,7 +41,6 @@ from drivetwin.report.figures.calibration import (
     plot_profiles,
 )
 from drivetwin.report.html import render_page
-from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.style import SIMULATED, make_axis, make_layout
 
 _TONES = {

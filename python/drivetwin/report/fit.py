@@ -30,13 +30,13 @@ from drivetwin.report.blocks import (
     TableBlock,
     TextBlock,
     VerdictBlock,
+    build_findings_section,
     make_table,
 )
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.html import render_page
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
-from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import MEASURED, MUTED, OVER, SIMULATED, UNDER
 from drivetwin.simulation.network import NetworkRun, Output

@@ -31,9 +31,8 @@ from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin._util.visible_text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification, Several
-from drivetwin.report.blocks import Block, FigureBlock, Section
+from drivetwin.report.blocks import Block, FigureBlock, Section, build_findings_section
 from drivetwin.report.figure import Entry, encode_entries
-from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.parameters import build_result_section
 from drivetwin.report.sections.stage_results import build_stage_sections

@@ -15,7 +15,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.fit.result import ModelFit
-from drivetwin.report.blocks import Block, TextBlock, make_table
+from drivetwin.report.blocks import Block, TextBlock, build_findings_section, make_table
 from drivetwin.report.brief import build_identification_blocks
 from drivetwin.report.data_frames import make_frame
 from drivetwin.report.figure import Figure
@@ -25,7 +25,6 @@ from drivetwin.report.figures.recording import QUANTITIES, plot_log
 from drivetwin.report.figures.validation import plot_validation
 from drivetwin.report.fit import build_fit_blocks, plot_recording
 from drivetwin.report.html import render_fragment
-from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.sections.summary import build_friction_table

@@ -35,14 +35,14 @@ _CALM = 2.0
 
 
 @dataclass(frozen=True)
-class Crossing:
-    """Time at which a slip leaves or reaches zero: `time` ± `sigma` [s]."""
+class Boundary:
+    """A phase boundary, at which a slip leaves or reaches zero: `time` ± `sigma` [s]."""
 
     time: float
     sigma: float
 
 
-def locate_slip_start(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
+def locate_slip_start(time: FloatArray, slip: FloatArray, noise: float) -> Boundary | None:
     """Locate the start of a slip (n,) that ends away from rest; None without one.
 
     `slip` [rad/s] is that of the off-going element, 0 at rest, up to the lock-up of the other.
@@ -62,7 +62,7 @@ def locate_slip_start(time: FloatArray, slip: FloatArray, noise: float) -> Cross
     steep = _interpolate_crossing(time, moved, far, last)
     hidden = (steep - at) / (np.sqrt(_STEEP) - 1.0)
     early = 0.5 * max(at - float(time[rest]), hidden)
-    return Crossing(at, float(np.hypot(early, _compute_step_error(time, last))))
+    return Boundary(at, float(np.hypot(early, _compute_step_error(time, last))))
 
 
 def _find_last_rest_sample(moved: FloatArray, limit: float, noise: float) -> int | None:
@@ -86,7 +86,7 @@ def _interpolate_crossing(time: FloatArray, moved: FloatArray, limit: float, las
     return float(np.interp(limit, moved[above - 1 : above + 1], time[above - 1 : above + 1]))
 
 
-def locate_slip_end(time: FloatArray, slip: FloatArray, noise: float) -> Crossing | None:
+def locate_slip_end(time: FloatArray, slip: FloatArray, noise: float) -> Boundary | None:
     """Locate the end of a slip (n,) that starts away from rest; None if it never ends.
 
     `slip` [rad/s] is that of the on-coming element, 0 where it is locked.
@@ -101,7 +101,7 @@ def locate_slip_end(time: FloatArray, slip: FloatArray, noise: float) -> Crossin
     step = float(time[last + 1] - time[last])
     hidden = _extrapolate_to_rest(time[: last + 1], np.abs(slip[: last + 1]), limit)
     if hidden > step:
-        return Crossing(
+        return Boundary(
             float(time[last]) + hidden,
             float(np.hypot(0.5 * hidden, _compute_step_error(time, last))),
         )
@@ -109,7 +109,7 @@ def locate_slip_end(time: FloatArray, slip: FloatArray, noise: float) -> Crossin
     share = float(np.clip(slip[last] / pace, 0.0, 1.0)) if pace != 0.0 else 1.0
     # Half of what the limit of rest hides, at the pace of the last step.
     reach = min(0.5 * limit / abs(pace), 1.0) if pace != 0.0 else 1.0
-    return Crossing(
+    return Boundary(
         float(time[last]) + share * step,
         float(np.hypot(reach * step, _compute_step_error(time, last))),
     )
@@ -154,14 +154,6 @@ _ROUNDING = 2e-5
 """Least noise of a speed, relative: resolution of two decimals in rpm."""
 
 
-@dataclass(frozen=True)
-class Boundary:
-    """A phase boundary, `time` ± `sigma` [s]."""
-
-    time: float
-    sigma: float
-
-
 def locate_break_away(
     speeds: GearboxSpeeds, ratio: float, held: tuple[int, int], stop: int, settings: ShiftSettings
 ) -> Boundary | None:
@@ -176,7 +168,7 @@ def locate_break_away(
     span = slice(first, stop + 1)
     seen = locate_slip_start(slip.time[span], slip.error[span] - slip.level, slip.noise)
     if slip.stairs or _is_sparse(speeds, settings):
-        return _to_boundary(seen)
+        return seen
     run = speeds.count_samples(_QUIET, 3)
     still = _find_true_runs(slip.deviation[: last + 1] < _LIMIT, run)
     anchor = max(int(still.max()) + run - 1, first) if len(still) else last
@@ -204,9 +196,7 @@ def locate_lock_up(
     slip = _compute_slip(part, ratio, rest, speeds.count_samples(SMOOTH, 3))
     if slip.stairs or _is_sparse(speeds, settings):
         span = slice(start, last + 1)
-        return _to_boundary(
-            locate_slip_end(slip.time[span], slip.error[span] - slip.level, slip.noise)
-        )
+        return locate_slip_end(slip.time[span], slip.error[span] - slip.level, slip.noise)
     run = speeds.count_samples(_QUIET, 3)
     still = _find_true_runs(slip.deviation[first : last + 1] < _LIMIT, run)
     anchor = first + int(still.min()) if len(still) else first
@@ -226,10 +216,6 @@ def _select_samples(speeds: GearboxSpeeds, first: int, last: int) -> tuple[int, 
 def _is_sparse(speeds: GearboxSpeeds, settings: ShiftSettings) -> bool:
     """Return True if the minimum number of samples of a fit exceeds the longest fit window."""
     return _LEAST * speeds.step > 2.0 * settings.hinge_window
-
-
-def _to_boundary(found: Crossing | None) -> Boundary | None:
-    return None if found is None else Boundary(found.time, found.sigma)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,8 @@ from dash.development.base_component import Component
 
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
-from drivetwin.report.blocks import make_table
+from drivetwin.report.blocks import build_findings_section, make_table
 from drivetwin.report.labels import get_parameter_label
-from drivetwin.report.sections.findings import build_findings_section
 from drivetwin.report.sections.fits import build_fit_table
 from drivetwin.report.sections.parameters import build_result_section
 from drivetwin.report.sections.summary import build_friction_section
