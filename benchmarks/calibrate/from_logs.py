@@ -83,7 +83,7 @@ its tail mean is higher on others, and on true units.
 The penalty is so large that the limit holds by it and seldom by a repair: results and optimum are
 compared by that objective.
 """
-_LAST = replace(_LIGHT, starts=0, polish_iterations=4, tail_iterations=6)
+_LAST = replace(_LIGHT, starts=0, tail_iterations=10)
 """Settings after the last log: a shorter polish from the best calibration so far."""
 _WARM = replace(_LAST, tail_draws=128)
 """Settings on the way: fewer draws."""

@@ -27,8 +27,13 @@ from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose, Scenarios
-from drivetwin.calibration.search import Evaluate, search_minima
 
+Evaluate = Callable[[Sequence[FloatArray]], list[float]]
+"""Objectives of candidates: coordinates (q,) from 0 to 1."""
+_EDGE = 1e-3
+"""Distance of a start from the bounds: CMA-ES has no room on them."""
+_EVALUATIONS = 4000
+"""Candidates of each start of CMA-ES."""
 _DIFFERENCE = 2e-5
 """Step of the differences of L-BFGS, in shares of the ranges."""
 _POWER = 8
@@ -80,14 +85,17 @@ def run_product(task: Task, fresh: Scenarios, _: float) -> Entry:
 
 def run_cma(task: Task, fresh: Scenarios, limit: float) -> Entry:
     """Run CMA-ES alone, one start after the other, on the draws of the polish."""
+    cma = import_module("cma")
 
     def search(evaluate: Evaluate, start: FloatArray) -> None:
         seed = 100 * task.seed
-        alone = replace(task.settings, starts=1, finalists=1, first_evaluations=4000,
-                        evaluations=4000)  # fmt: skip
         while True:
-            search_minima(evaluate, start, alone, seed)
             seed += 1
+            options = {"bounds": [0.0, 1.0], "seed": seed, "popsize": 24, "verbose": -9}
+            one = cma.CMAEvolutionStrategy(np.clip(start, _EDGE, 1.0 - _EDGE), 0.12, options)
+            while one.countevals < _EVALUATIONS and not one.stop():
+                candidates = one.ask()
+                one.tell(candidates, evaluate([np.asarray(each) for each in candidates]))
 
     return _run_within("CMA-ES alone", task, (make_quick_plant(task), fresh), limit, search)
 

@@ -13,7 +13,7 @@ from drivetwin.calibration.calibrate import Calibration, Task, calibrate
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
 from drivetwin.calibration.policies.kind import PolicyKind
-from tests.calibration.cases import SHIFTS, make_task
+from tests.calibration.cases import QUICK, SHIFTS, make_task
 
 TIME = (Limit(Metric.SHIFT_TIME, 0.95),)
 
@@ -49,6 +49,7 @@ def test_improves_on_fresh_draws_and_repeats_itself(found: Calibration) -> None:
 
 @pytest.mark.parametrize("kind", [PolicyKind.CONTROLLER, PolicyKind.KNOTS])
 def test_an_inertia_phase_that_comes_first_is_calibrated(kind: PolicyKind) -> None:
-    found = calibrate(make_coarse(shift="power-on downshift", policy=kind))
+    settings = replace(QUICK, search_iterations=8)
+    found = calibrate(make_coarse(shift="power-on downshift", policy=kind, settings=settings))
     assert compare_jerk(found) < 0.9
     assert found.after.certificate.unlocked == 0

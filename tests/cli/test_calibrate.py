@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -339,13 +338,3 @@ def test_own_bounds_limits_and_labels_are_kept(twin: Path, tmp_path: Path) -> No
         assert curve.axis.points == (0.0, 400.0, 800.0)
         (kiss,) = content.scalars
         assert kiss.value == pytest.approx(found["kiss_pressure"].value / 1e5)
-
-
-def test_a_missing_search_library_is_told_before_any_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Even before the twin is read, which may be followed by minutes of correction by logs."""
-    monkeypatch.setitem(sys.modules, "cma", None)
-    absent = tmp_path / "absent.toml"
-    assert main(["calibrate", str(absent), "--shift", "2-3", "-o", str(tmp_path / "out")]) == 2
-    assert "drivetwin[calibrate]" in capsys.readouterr().err

@@ -29,8 +29,8 @@ ONE_SAMPLE = 1.001e-3
 """Tolerance of the response time [s], which is that of the first sample [1 ms] beyond a slip; the
 thousandth is for the rounding of a difference of times."""
 SHORT = replace(
-    QUICK, population=12, first_evaluations=48, evaluations=120, search_draws=8, polish_draws=16,
-    polish_iterations=4, tail_draws=24, tail_iterations=2,
+    QUICK, starts=2, hops=1, search_iterations=4, search_draws=8, polish_draws=16,
+    tail_draws=24, tail_iterations=2,
 )  # fmt: skip
 """Search and polish within a second."""
 

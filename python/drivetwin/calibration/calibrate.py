@@ -38,7 +38,7 @@ from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stag
 _COARSE = 2e-3
 """Sampling step [s] of the search."""
 _STAGES = TimedStages("calibration", ("search", "polish", "limits", "certificate"))
-_POLISH = TimedStages("polish", ("start", "tail"))
+_POLISH = TimedStages("polish", ("minimum",))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +88,7 @@ class Calibration:
 def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
     """Search, polish and certify a calibration; `stages` may have its coordinates already.
 
-    The best one found is returned even if it exceeds a limit; see `require_limits`. Raises
-    MissingExtraError without the library of the search.
+    The best one found is returned even if it exceeds a limit; see `require_limits`.
     """
     settings, space = task.settings, Space(task.policy)
     quick = make_quick_plant(task)
@@ -176,36 +175,28 @@ def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
     settings, space = task.settings, Space(task.policy)
     if settings.starts == 0:
         return [Candidate(space.start, float("inf"))]
-    draws = draw_for(task, settings.search_draws, Purpose.SEARCH)
     coarse = set_coarse_step(plant)
+    few = _make_run(task, coarse, draw_for(task, settings.search_draws, Purpose.SEARCH))
+    other = _make_run(task, coarse, draw_for(task, settings.polish_draws, Purpose.POLISH))
 
-    def evaluate(candidates: Sequence[FloatArray]) -> list[float]:
-        controls = [space.build_control(one) for one in candidates]
-        return [objective.evaluate(one) for one in coarse.evaluate_all(controls, draws)]
+    def improve(at: FloatArray) -> Candidate:
+        found = polish(few, at, objective, settings.search_iterations).coordinates
+        return Candidate(found, objective.evaluate(other([found])[0]))
 
-    return search_minima(evaluate, space.start, settings, task.seed)
+    return search_minima(improve, space.start, settings, task.seed)
 
 
 def _polish(
     task: Task, plant: Plant, objective: Objective, found: Sequence[Candidate]
 ) -> FloatArray:
-    """Polish all finalists, then the best of them on more draws.
-
-    The best are those of the least objective on these draws: few draws miss most second slips.
-    """
+    """Polish the best minima on the draws for the tail; return the best of them."""
     settings = task.settings
-    run = _make_run(task, plant, draw_for(task, settings.polish_draws, Purpose.POLISH))
-    wider = _make_run(task, plant, draw_for(task, settings.tail_draws, Purpose.TAIL))
-    polished, stages = [], _POLISH.repeat("start", len(found))
-    for number, one in enumerate(found):
-        with stages.enter("start", number=number):
-            at = polish(run, one.coordinates, objective, settings.polish_iterations).coordinates
-            polished.append(Candidate(at, objective.evaluate(wider([at])[0])))
-    finalists = sorted(polished, key=lambda one: one.value)[: settings.tail_finalists]
-    with stages.enter("tail"):
-        last = [
-            polish(wider, one.coordinates, objective, settings.tail_iterations) for one in finalists
-        ]
+    run = _make_run(task, plant, draw_for(task, settings.tail_draws, Purpose.TAIL))
+    finalists = found[: settings.finalists]
+    last, stages = [], _POLISH.repeat("minimum", len(finalists))
+    for number, one in enumerate(finalists):
+        with stages.enter("minimum", number=number):
+            last.append(polish(run, one.coordinates, objective, settings.tail_iterations))
     return min(last, key=lambda one: one.value).coordinates
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.calibration.designed_normals import list_designed
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.oil import SAME_OIL, OilState
 from drivetwin.calibration.spread import Spread
@@ -95,14 +96,17 @@ def draw_scenarios(
 ) -> Scenarios:
     """Draw `count` units, each of a type of its own, with steady starts.
 
-    Actuators have random numbers of their own. Raises InputError where most draws are impossible
-    (an inertia below zero).
+    Draws of the optimiser are designed, all others random. An impossible unit (an inertia below
+    zero) is replaced by a random one. Raises InputError where most draws are impossible.
     """
     random = np.random.default_rng([seed, int(purpose)])
+    designed = purpose in (Purpose.SEARCH, Purpose.POLISH, Purpose.TAIL)
+    sources = iter(list_designed(count, [seed, int(purpose)]) if designed else ())
 
     def make() -> Driveline | None:
-        unit = draw.driveline(random)
-        return None if unit is None else _keep_possible(unit(random))
+        source = next(sources, random)
+        unit = draw.driveline(source)
+        return None if unit is None else _keep_possible(unit(source))
 
     drawn = collect_scenarios(maneuver, _repeat(make, count))
     if draw.actuators is None:

@@ -1,28 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""Global search by CMA-ES from several seeds, the best of which are continued.
+"""Global search by short polishes: from random starts, then from hops of a pool of the best.
 
-Source: N. Hansen, The CMA evolution strategy: a tutorial, arXiv:1604.00772 (2016).
+Source: D. Wales and J. Doye, Global optimization by basin-hopping, J. Phys. Chem. A 101 (1997).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.optional_dependencies import import_extra
 from drivetwin._util.progress import notify_progress
 from drivetwin.calibration.settings import CalibrationSettings
 
-Evaluate = Callable[[Sequence[FloatArray]], list[float]]
-"""Objectives of candidates: coordinates (q,) from 0 to 1."""
-
-_EDGE = 1e-3
-"""Distance of a start from the bounds: the search has no room on them."""
+_POOL = 6
+"""Minima from which hops start."""
+_CLOSE = 0.02
+"""Largest distance of coordinates at which two minima count as one."""
+_RANK = 1.2
+"""Scale of the exponential law by which a hop chooses the rank of its minimum."""
+_PARTIAL, _PARTIAL_STEP = 0.3, 2.5
+"""Share of the coordinates that a partial hop moves, and its step over that of a full one."""
+_CROSS_STEP = 0.3
+"""Step of a hop between two minima, over that of a full one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,51 +36,40 @@ class Candidate:
 
 
 def search_minima(
-    evaluate: Evaluate, start: FloatArray, settings: CalibrationSettings, seed: int
+    improve: Callable[[FloatArray], Candidate],
+    start: FloatArray,
+    settings: CalibrationSettings,
+    seed: int,
 ) -> list[Candidate]:
-    """Return the minima of the finalists, best first.
+    """Return the pool of minima, best first.
 
-    Raises MissingExtraError without the library `cma`.
+    `improve` polishes coordinates (q,) and returns them with the objective on other draws.
     """
-    cma = require_search()
-    searches = [
-        _start_search(cma, start, settings, seed + number) for number in range(settings.starts)
-    ]
-    rest = settings.evaluations - settings.first_evaluations
-    total = settings.starts * settings.first_evaluations + settings.finalists * rest
-    done = _advance(searches, evaluate, settings.first_evaluations, (0, total))
-    searches.sort(key=lambda one: float(one.best.f))
-    finalists = searches[: settings.finalists]
-    _advance(finalists, evaluate, settings.evaluations, (done, total))
-    found = [Candidate(np.asarray(one.best.x), float(one.best.f)) for one in finalists]
-    return sorted(found, key=lambda one: one.value)
+    random = np.random.default_rng([seed, 5])
+    total, pool = settings.starts + settings.hops, list[Candidate]()
+    for number in range(total):
+        notify_progress(number / total)
+        if number == 0:
+            at = start
+        elif number < settings.starts:
+            at = start + settings.initial_step * random.standard_normal(start.size)
+        else:
+            at = _hop(pool[:_POOL], settings.hop_step, random)
+        found = improve(np.clip(at, 0.0, 1.0))
+        near = [one for one in pool if np.abs(one.coordinates - found.coordinates).max() < _CLOSE]
+        if all(found.value < one.value for one in near):
+            others = (one for one in pool if one not in near)
+            pool = sorted([*others, found], key=lambda one: one.value)
+    return pool[:_POOL]
 
 
-def require_search() -> Any:
-    """Return the library of the search. Raises MissingExtraError without it."""
-    return import_extra("cma", "calibrate", "the search of a calibration", Path("calibrate"))
-
-
-def _start_search(cma: Any, start: FloatArray, settings: CalibrationSettings, seed: int) -> Any:
-    options = {
-        "bounds": [0.0, 1.0],
-        "seed": seed + 1,  # 0 would take the clock
-        "popsize": settings.population,
-        "verbose": -9,
-    }
-    begin = np.clip(start, _EDGE, 1.0 - _EDGE)
-    return cma.CMAEvolutionStrategy(begin, settings.initial_step, options)
-
-
-def _advance(
-    searches: Sequence[Any], evaluate: Evaluate, evaluations: int, progress: tuple[int, int]
-) -> int:
-    """Continue each search to a number of evaluations; return the number done in all."""
-    done, total = progress
-    for search in searches:
-        while search.countevals < evaluations and not search.stop():
-            candidates = search.ask()
-            search.tell(candidates, evaluate([np.asarray(one) for one in candidates]))
-            done += len(candidates)
-            notify_progress(done / total)
-    return done
+def _hop(pool: list[Candidate], step: float, random: np.random.Generator) -> FloatArray:
+    """Move from a minimum of the pool: all coordinates, some, or towards another minimum."""
+    at = pool[min(int(random.exponential(_RANK)), len(pool) - 1)].coordinates
+    noise, kind = random.standard_normal(at.size), random.random()
+    if kind < 0.5:
+        return at + step * noise
+    if kind < 0.75:
+        return at + _PARTIAL_STEP * step * noise * (random.random(at.size) < _PARTIAL)
+    other = pool[int(random.integers(len(pool)))].coordinates
+    return at + random.uniform(-0.3, 1.3) * (other - at) + _CROSS_STEP * step * noise

@@ -14,24 +14,22 @@ class CalibrationSettings:
     """Effort and tolerances of search, polish and certificate."""
 
     starts: int = 8
-    """Independent searches; the problem has many local minima. 0 polishes the start alone."""
-    finalists: int = 8
-    """Searches that are continued and polished."""
-    tail_finalists: int = 2
-    """Polished searches that are polished again on the draws for the tail."""
-    population: int = 24
-    """Candidates per generation."""
-    first_evaluations: int = 960
-    """Candidates of each search before the finalists are chosen."""
-    evaluations: int = 960
-    """Candidates of each finalist in all. More gain little where polishes are cheap: the search
-    fits its few draws ever closer."""
-    initial_step: float = 0.12
-    """Standard deviation of the first generation, in shares of the ranges."""
-    search_draws: int = 16
-    """Scenarios of the search."""
+    """Short polishes from random starts; the problem has many local minima. 0 polishes the start
+    alone."""
+    hops: int = 18
+    """Short polishes from hops of the best minima."""
+    finalists: int = 1
+    """Minima that are polished again on the draws for the tail."""
+    initial_step: float = 0.15
+    """Standard deviation of the random starts, in shares of the ranges."""
+    hop_step: float = 0.07
+    """Standard deviation of a hop, in shares of the ranges."""
+    search_draws: int = 32
+    """Scenarios of a short polish."""
+    search_iterations: int = 6
+    """Largest number of linear programs of a short polish."""
     polish_draws: int = 64
-    """Scenarios of the polish."""
+    """Scenarios by which minima are compared, and those of repairs."""
     tail_draws: int = 256
     """Scenarios of the last polish, which shapes the tail."""
     check_draws: int = 2000
@@ -54,8 +52,6 @@ class CalibrationSettings:
     tail_share: float = 0.9
     """Quantile beyond which peak jerk is averaged. The mean beyond 90 % is the value of 95 % of the
     units where the tail is even. A mean beyond 98 % lowers the worst units at the cost of that."""
-    polish_iterations: int = 12
-    """Largest number of linear programs of the polish."""
     tail_iterations: int = 8
     """Largest number of linear programs of the last polish."""
     neighbour_draws: int = 40
@@ -80,25 +76,15 @@ class CalibrationSettings:
         """Return the default settings of a policy.
 
         A run behind actuators, task by task, takes several times as long as one of profiles: few
-        searches are polished, after more candidates.
+        minima are searched.
         """
-        if policy.commands_actuators:
-            return cls(
-                starts=4,
-                finalists=2,
-                tail_finalists=1,
-                population=12,
-                first_evaluations=480,
-                evaluations=1440,
-            )
-        return cls()
+        return cls(starts=5, hops=8) if policy.commands_actuators else cls()
 
     def scale_effort(self, factor: float) -> CalibrationSettings:
         """Return settings whose search and polish are longer by `factor`."""
         return replace(
             self,
-            first_evaluations=max(self.population, round(factor * self.first_evaluations)),
-            evaluations=max(self.population, round(factor * self.evaluations)),
-            polish_iterations=max(1, round(factor * self.polish_iterations)),
+            starts=max(1, round(factor * self.starts)),
+            hops=round(factor * self.hops),
             tail_iterations=max(1, round(factor * self.tail_iterations)),
         )

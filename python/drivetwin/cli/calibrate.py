@@ -103,12 +103,9 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
     Where a limit is out of reach, the best calibration found is written and the exit code is 2.
     """
     from drivetwin.calibration.identified_range import check_identified_range
-    from drivetwin.calibration.search import require_search
     from drivetwin.report.calibration import build_calibration_blocks
     from drivetwin.report.correction import build_correction_blocks
 
-    if not (request.from_logs and request.start):
-        require_search()
     if request.controller is not None:
         request = replace(request, policy=PolicyKind.OWN)
     model = load_valid_twin(request.twin)

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Search of a calibration: hops reach the best of many minima, and its draws are designed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivetwin.calibration.calibrate import draw_for
+from drivetwin.calibration.scenarios import Purpose
+from drivetwin.calibration.search import Candidate, search_minima
+from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.twin_task import Request, build_task
+from tests.calibration.twins import make_exact_twin
+from tests.support.arrays import FloatArray
+
+SETTINGS = CalibrationSettings(starts=4, hops=200)
+
+
+def improve(at: FloatArray) -> Candidate:
+    """Descend to the minimum of the cell of `at`: cells of width 0.1, the best at 0.65."""
+    found = np.clip(np.round((at - 0.05) / 0.1) * 0.1 + 0.05, 0.05, 0.95)
+    return Candidate(found, float(np.sum((found - 0.65) ** 2)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hops_reach_the_best_of_many_minima(seed: int) -> None:
+    start = np.full(4, 0.25)
+    found = search_minima(improve, start, SETTINGS, seed)
+    values = [one.value for one in found]
+    assert values == sorted(values)
+    assert values[0] <= 0.011
+    alone = search_minima(improve, start, replace(SETTINGS, hops=0), seed)
+    assert alone[0].value > 5.0 * values[0]
+    coordinates = {tuple(one.coordinates.round(3).tolist()) for one in found}
+    assert len(coordinates) == len(found)
+    again = search_minima(improve, start, SETTINGS, seed)
+    assert [one.value for one in again] == values
+
+
+def test_draws_of_the_optimiser_are_designed_and_others_random() -> None:
+    """Means of 64 designed gains have less than a tenth of the error of random ones."""
+    spread = Spread(oil_temperature=0.0)
+    errors: dict[Purpose, list[float]] = {Purpose.POLISH: [], Purpose.CERTIFICATE: []}
+    for seed in range(6):
+        request = Request(gears=("2", "3"), spread=spread, limits=(), seed=seed)
+        task = build_task(make_exact_twin(), request)
+        for purpose, own in errors.items():
+            gains = draw_for(task, 64, purpose).sets["B3.gain"]
+            own.append(float(gains.mean() / task.maneuver.oncoming.gain - 1.0) / (0.025 / 8.0))
+    designed, random = (float(np.sqrt(np.mean(np.square(one)))) for one in errors.values())
+    assert 0.4 < random < 2.0
+    assert designed < 0.1 * random
