@@ -111,6 +111,11 @@ class DrivenTerm:
     label: str = ""
     inputs: Mapping[str, Signal] = field(default_factory=dict)
 
+    @property
+    def speeds(self) -> list[str]:
+        """Names of the compared speeds."""
+        return self.plant.list_speeds()
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Coordinates that act on this recording."""

@@ -105,6 +105,10 @@ class Plant:
         """Return the unknown of the start of a node or shaft."""
         return f"{self.label}.start.{name}" if self.label else f"start.{name}"
 
+    def list_speeds(self) -> list[str]:
+        """List the names of the compared speeds."""
+        return [name for name, one in self.outputs.items() if one[0] == "speed"]
+
     def list_undifferentiated(self) -> list[str]:
         """List the coordinates that act on numbers by which the core has no derivatives."""
         plain = (name for name, place in self._acting if not place.schema.differentiable)

@@ -60,7 +60,7 @@ class NetworkTerm:
     @property
     def speeds(self) -> list[str]:
         """Names of the compared speeds."""
-        return [name for name, one in self.plant.outputs.items() if one[0] == "speed"]
+        return self.plant.list_speeds()
 
     @property
     def inputs(self) -> Mapping[str, Signal]:
