@@ -13,7 +13,7 @@ from scipy.constants import bar
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.estimation.result.verdict import assess_with_prior, reject_identified
+from drivetwin.estimation.result.verdict import assess_with_prior
 from drivetwin.parameters import ParameterSpec
 from drivetwin.tcu.identify import FittedShifts
 from drivetwin.tcu.log import ControllerShift
@@ -43,10 +43,9 @@ _DRUM = (
     "on the card."
 )
 _DAMPING = "It takes up errors of the law of the tyre, whose slip damps as well."
-_DOUBTS = {
-    "shaft_stiffness": "It takes up errors of the law of the tyre, which is in series with it."
-}
-"""Quantities that are weak at best, with the reason."""
+_STIFFNESS = (
+    "It takes up errors of the law of the tyre, which is in series with it. The log shows the sum."
+)
 
 
 @dataclass(frozen=True)
@@ -73,9 +72,7 @@ def state(found: FittedShifts) -> dict[str, Estimate]:
     values, aside = found.coordinates.to_values(found.point.values), _step_aside(found)
     for one in (*_list_vehicle(), *_list_elements(found)):
         estimates[one.name] = _judge(found, one, values, aside)
-    for name, doubt in _DOUBTS.items():
-        estimates[name] = reject_identified(estimates[name], doubt)
-    reasons = {"J_drum": _DRUM, "shaft_damping": _DAMPING}
+    reasons = {"J_drum": _DRUM, "shaft_stiffness": _STIFFNESS, "shaft_damping": _DAMPING}
     for element in list_used(found.shifts):
         reasons |= {f"{element}.{number}": text for number, text in _WITHHELD.items()}
     for name, text in reasons.items():
@@ -113,7 +110,6 @@ _VEHICLE = {
     J_VEHICLE: ("kg*m^2", "vehicle inertia at the gearbox output"),
     "converter_scale": ("1", "capacity of the converter over that of the card"),
     "converter_overrun": ("1", "capacity in overrun over that in drive"),
-    "shaft_stiffness": ("N*m/rad", "stiffness between gearbox output and rims, at the output"),
     "tyre_slip_stiffness": ("N*m", "torque over slip of the tyres, at the output"),
 }
 """Units and meanings of the numbers of the vehicle that are stated as they are."""
