@@ -68,7 +68,7 @@ def compute_response(bench: Bench, term: ShiftTerm, truth: ParameterVector) -> F
     assert base is not None
     start = term.record.sample_run(base)
     columns = []
-    for name, signal in _collect_inputs(term).items():
+    for name, signal in term.record.inputs.items():
         role = "engine_torque" if name == "engine torque" else f"pressure.{name}"
         std = compute_noise(bench, role)
         acting = np.array([k for k, t in enumerate(signal.time) if _can_act(term, name, float(t))])
@@ -98,27 +98,21 @@ def _compute_change(
     return (term.record.sample_run(run) - start) / step
 
 
-def _collect_inputs(term: ShiftTerm) -> dict[str, Signal]:
-    return {"engine torque": term.record.engine_torque} | dict(term.record.pressures)
-
-
 def _can_act(term: ShiftTerm, name: str, stamp: float) -> bool:
     """Return whether a sample can act: a pressure does not while its element is fully engaged."""
     time = term.record.time
     if name == "engine torque":
         return bool(time[0] - 0.1 < stamp < time[-1] + 0.1)
     pressure = term.record.pressures[name]
-    low = term.structure.driveline.couplings[name].P0.value - PRESSURE_STEP
+    low = term.plant.driveline.couplings[name].P0.value - PRESSURE_STEP
     value = float(np.interp(stamp, pressure.time, pressure.values))
     return bool(time[0] < stamp < time[-1]) and value > low
 
 
 def _disturb(term: ShiftTerm, name: str, samples: IndexArray, step: float) -> ShiftTerm:
     record = term.record
-    signal = _collect_inputs(term)[name]
+    signal = record.inputs[name]
     values = signal.values.copy()
     values[samples] += step
     changed = Signal(signal.time, values)
-    if name == "engine torque":
-        return replace(term, record=replace(record, engine_torque=changed))
-    return replace(term, record=replace(record, pressures={**record.pressures, name: changed}))
+    return replace(term, record=replace(record, inputs={**record.inputs, name: changed}))

@@ -186,7 +186,7 @@ def propagate(
     variance = np.einsum("qp,pr,qr->q", matrix, covariance, matrix)
     pairs = zip(values.items(), variance, strict=True)
     found = {name: (value, float(np.sqrt(v))) for (name, value), v in pairs}
-    element = problem.terms[0].structure.driveline.oncoming.name
+    element = problem.terms[0].plant.driveline.oncoming.name
     index = [point.names.index(f"{element}.{key}") for key in LAW]
     mu, by_law = evaluate_stribeck(point.values[index], np.array(list(slips.values())))
     std = np.sqrt(np.einsum("pn,pq,qn->n", by_law, covariance[np.ix_(index, index)], by_law))

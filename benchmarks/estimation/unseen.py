@@ -182,12 +182,12 @@ def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[
     ideal = run(recorded.scenario, recorded.seed, noise=0.0)
     exact = _read_exactly(signals, ideal)
     old = fit.problem.terms[0]
-    bench = Bench(exact, old.structure.driveline, dict(recorded.truth.parameters), ideal)
+    bench = Bench(exact, old.plant.driveline, dict(recorded.truth.parameters), ideal)
     sensors = {sensor.role: sensor for sensor in recorded.scenario.sensors}
     means = SPEEDS if sensors["input_speed"].window > 0.0 else ()
     curved = {TORQUE} & fit.problem.modes
     record = build_record(exact, split_spans([exact])[0]).select_modes({*means, *curved})
-    term = ShiftTerm.from_sensor_noise(old.structure, record)
+    term = ShiftTerm.from_sensor_noise(old.plant, record)
     start = fit.point.replace_values(_build_values(fit.point, term, bench))
     truth = build_point(replace(fit.problem, terms=(term,)), start, bench)
     least = compute_bound(bench, term, truth, fit.problem.prior)
@@ -222,7 +222,7 @@ def _build_values(point: ParameterVector, term: ShiftTerm, bench: Bench) -> Floa
     """Return the truth by unknown (p,), torques over η if the fit has them so; starts unchanged."""
     model = bench.run.scenario.model
     truth = {**build_guess(bench), TE_OFFSET: 0.0, AERO: model.load.aero}
-    truth["Tv_over_if"] += model.load.aero * term.structure.mean_speed**2 / model.i_f
+    truth["Tv_over_if"] += model.load.aero * term.plant.mean_speed**2 / model.i_f
     if not term.scale_known:
         truth = _scale(truth, model)
     return np.array([truth.get(n, v) for n, v in zip(point.names, point.values, strict=True)])

@@ -19,7 +19,7 @@ from benchmarks.estimation.study import SLIPS, compute_guess, propagate
 from benchmarks.fit.report import format_header, format_row
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.likelihood.data.shift_record import RECORD
+from drivetwin.estimation.likelihood.data.recorded_data import RECORD
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
 from drivetwin.estimation.likelihood.priors import build_problem
@@ -113,7 +113,7 @@ def _fit_network(
     bench: Bench, problem: LikelihoodObjective[ShiftTerm], start: ParameterVector
 ) -> dict[str, tuple[float, float]]:
     term = problem.terms[0]
-    dual = term.structure.build_model(start)
+    dual = term.plant.build_model(start)
     record = term.record
     outputs = {
         one.name: Measured(record.time[one.place], one.values, one.sigma) for one in record.outputs

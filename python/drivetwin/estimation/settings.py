@@ -10,7 +10,7 @@ from drivetwin.estimation import identification
 from drivetwin.estimation.data import noise, segments, select_shifts
 from drivetwin.estimation.direct import load_balance, momentum_balance
 from drivetwin.estimation.likelihood import coloured_noise, objective, priors
-from drivetwin.estimation.likelihood.data import input_smoothing, shift_record
+from drivetwin.estimation.likelihood.data import input_smoothing, recorded_data
 from drivetwin.estimation.likelihood.effects import causes, correction, joint_step
 from drivetwin.estimation.likelihood.noise import residual_covariance
 from drivetwin.estimation.likelihood.optimize import initial_guess, multistart
@@ -19,7 +19,7 @@ from drivetwin.estimation.result import prior_conflict, verdict
 
 _STAGES = (
     *(noise, select_shifts, segments, momentum_balance, load_balance, initial_guess),
-    *(shift_record, input_smoothing, priors, multistart, gauss_newton, objective),
+    *(recorded_data, input_smoothing, priors, multistart, gauss_newton, objective),
     *(residual_covariance, coloured_noise, causes, joint_step, correction),
     *(verdict, prior_conflict, identification),
 )

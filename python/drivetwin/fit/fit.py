@@ -12,6 +12,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError, InputError, suggest_spelling
+from drivetwin.estimation.likelihood.data.recorded_data import RecordedData
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
@@ -21,12 +22,11 @@ from drivetwin.fit.expression import ResolvedNumbers, add_rows
 from drivetwin.fit.fixed_numbers import list_fixed, make_plain
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.places import Place
-from drivetwin.fit.plant import Plant
-from drivetwin.fit.recording import NetworkRecord, Recording, build_network_record
+from drivetwin.fit.plant import NetworkTerm, Plant, Problem
+from drivetwin.fit.recording import Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import search
 from drivetwin.fit.starts import drop_redundant_speeds, guess_start
-from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.simulation.element_schema import (
     GROUND,
     find_element_faults,
@@ -135,8 +135,8 @@ def build_problem(
     lower, upper = np.array(found.limits).T
     point = ParameterVector(tuple(found.names), np.array(found.values))
     prior = add_rows(prior, point, numbers.derived)
-    for term in terms:
-        term.simulate(point)  # raises InputError for a start or output that the network lacks
+    for term in terms:  # raises InputError for a start or output that the network lacks
+        term.build_task(point).simulate()
     for recording in recordings:
         _require_used(model, recording)
     reach = np.full(len(found.names), np.inf)
@@ -154,7 +154,7 @@ def _describe_known(recording: Recording, model: NetworkModel) -> dict[str, Prio
 
 
 def _build_plant(
-    plain: Plant, model: NetworkModel, recording: Recording, record: NetworkRecord
+    plain: Plant, model: NetworkModel, recording: Recording, record: RecordedData
 ) -> Plant:
     """Build the network of a recording, with the inputs that it has not, and a start of which no
     speed follows from the others."""

@@ -30,9 +30,9 @@ from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import EXPLAINED
 from drivetwin.fit.fixed_numbers import FixedNumber, Source
 from drivetwin.fit.places import list_places
+from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.quantities import find_input_quantity
 from drivetwin.fit.release import extend
-from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import ASCII_UNITS
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import GROUND

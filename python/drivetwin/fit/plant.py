@@ -11,7 +11,10 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.output import Output as ComparedOutput
+from drivetwin.estimation.likelihood.data.output import Channel
+from drivetwin.estimation.likelihood.data.recorded_data import RecordedData
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.term import RecordedPlant, RecordedTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.places import CHANNEL, Numbers, Place
@@ -21,42 +24,8 @@ from drivetwin.simulation.network import Element, Output, Sine, Start, make_inpu
 from drivetwin.simulation.network_sensitivity import NetworkTask
 
 
-@dataclass(frozen=True)
-class Channel:
-    """Measured quantity of a quantity x: `gain` · x(t - `delay`) + `offset`."""
-
-    gain: float = 1.0
-    offset: float = 0.0
-    delay: float = 0.0
-
-    def shift(self, time: FloatArray, columns: FloatArray) -> FloatArray:
-        """Interpolate quantities (N, ...) at the instants `time` (N,) [s] less the delay."""
-        if self.delay == 0.0:
-            return columns
-        at = time - self.delay
-        after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
-        share = np.clip((at - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
-        share = share.reshape(-1, *[1] * (columns.ndim - 1))
-        return np.asarray((1.0 - share) * columns[after - 1] + share * columns[after])
-
-    def show(self, time: FloatArray, column: FloatArray) -> FloatArray:
-        """Compute the measured quantity (N, ...) of a quantity over `time` (N,) [s]."""
-        return np.asarray(self.gain * self.shift(time, column) + self.offset)
-
-    def find_shown(self, out: ComparedOutput, time: FloatArray) -> ComparedOutput:
-        """Return an output with its samples at the points of the grid `time` (N,) [s] that they
-        show: earlier by the delay."""
-        if self.delay == 0.0:
-            return out
-        place, centre = (
-            np.minimum(np.searchsorted(time, time[one] - self.delay), time.size - 1)
-            for one in (out.place, out.centre)
-        )
-        return replace(out, place=place, centre=centre)
-
-
 @dataclass(frozen=True, eq=False)
-class Plant:
+class Plant(RecordedPlant):
     """Network of one recording.
 
     `inputs` are those that no channel gives, `levels` the constant ones among them, `sizes` the
@@ -104,10 +73,6 @@ class Plant:
     def get_start_name(self, name: str) -> str:
         """Return the unknown of the start of a node or shaft."""
         return f"{self.label}.start.{name}" if self.label else f"start.{name}"
-
-    def list_speeds(self) -> list[str]:
-        """List the names of the compared speeds."""
-        return [name for name, one in self.outputs.items() if one[0] == "speed"]
 
     def list_undifferentiated(self) -> list[str]:
         """List the coordinates that act on numbers by which the core has no derivatives."""
@@ -174,20 +139,10 @@ class Plant:
         moved = self.compute_tables(point)["outputs"] if self._channels["outputs"] else {}
         return {name: Channel(**moved.get(name, CHANNEL)) for name in self.outputs}
 
-    def show_outputs(
-        self,
-        point: ParameterVector,
-        time: FloatArray,
-        columns: Mapping[Output, FloatArray],
-        *,
-        changes: bool = False,
-    ) -> dict[str, FloatArray]:
-        """Compute the compared outputs (N, ...) over `time` (N,) [s] as their channels show them;
-        of `changes` of the outputs those that they show."""
-        channels = self.build_channels(point)
-        if changes:
-            channels = {name: replace(one, offset=0.0) for name, one in channels.items()}
-        return {name: one.show(time, columns[self.outputs[name]]) for name, one in channels.items()}
+    def get_gains(self, point: ParameterVector) -> dict[str, float]:
+        """Return the gain of each measured input whose channel moves."""
+        moved = self.compute_tables(point)["inputs"]
+        return {name: float(numbers["gain"]) for name, numbers in moved.items()}
 
     def compute_tables(
         self, point: ParameterVector, inputs: Mapping[str, Signal | Sine] | None = None
@@ -236,3 +191,7 @@ _SHARE = 1e-6
 
 It is the root of the truncation error of a run. A larger step moves events past samples, whose
 differences are then no derivatives."""
+
+
+NetworkTerm = RecordedTerm[Plant, RecordedData]
+Problem = LikelihoodObjective[NetworkTerm]

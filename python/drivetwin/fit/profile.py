@@ -20,7 +20,7 @@ from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.fit.term import Problem
+from drivetwin.fit.plant import Problem
 
 
 @dataclass(frozen=True)

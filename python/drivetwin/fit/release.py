@@ -23,7 +23,7 @@ from drivetwin.estimation.optimize.gauss_newton import (
 )
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.fixed_numbers import FixedNumber
-from drivetwin.fit.term import Problem
+from drivetwin.fit.plant import Problem
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,9 @@ from drivetwin.fit.expression import Expression, ResolvedNumbers
 from drivetwin.fit.fixed_numbers import FixedNumber, Source, Tolerance
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.omissions import ShownOmission
+from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.profile import trace_slow, widen
 from drivetwin.fit.search import FoundMinimum, RefinedStart
-from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import PlacedNumber, SoughtNumber
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.vehicle.spec import PriorValue
@@ -262,7 +262,7 @@ class ModelFit(EstimatesMixin):
             what = f"{name!r} is no unknown of the fit{suggest_spelling(name, self.estimates)}"
             raise InputError(what, f"use {', '.join(self.estimates)}")
         point = self.minimum.point.replace_values(values)
-        return tuple(term.simulate(point) for term in self.problem.terms)
+        return tuple(term.build_task(point).simulate() for term in self.problem.terms)
 
     def draw(self, count: int, *, seed: int = 0) -> dict[str, FloatArray]:
         """Draw values of the unknowns from their joint distribution.

@@ -27,8 +27,8 @@ from drivetwin.estimation.optimize.gauss_newton import (
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.omissions import ShownOmission, complete_model
+from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.release import release_fixed
-from drivetwin.fit.term import NetworkTerm, Problem
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
 

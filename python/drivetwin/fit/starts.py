@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.fit.recording import NetworkRecord
+from drivetwin.estimation.likelihood.data.recorded_data import RecordedData
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element, Output, Sine, Start
 from drivetwin.simulation.network_sensitivity import differentiate
@@ -45,7 +45,7 @@ def guess_start(
     known: Mapping[str, PriorValue],
     elements: Sequence[Element],
     outputs: Mapping[str, Output],
-    record: NetworkRecord,
+    record: RecordedData,
 ) -> StartGuess:
     """Guess the start of a recording.
 
@@ -129,7 +129,7 @@ def drop_redundant_speeds(
     return Start(kept, start.twists, start.locked)
 
 
-def _read_first_values(outputs: Mapping[str, Output], record: NetworkRecord) -> dict[Output, float]:
+def _read_first_values(outputs: Mapping[str, Output], record: RecordedData) -> dict[Output, float]:
     """Read the value of each compared quantity at the start of the grid."""
     found = {}
     for out in record.outputs:
@@ -140,7 +140,7 @@ def _read_first_values(outputs: Mapping[str, Output], record: NetworkRecord) -> 
 
 
 def _find_largest_torque(
-    elements: Sequence[Element], outputs: Mapping[str, Output], record: NetworkRecord
+    elements: Sequence[Element], outputs: Mapping[str, Output], record: RecordedData
 ) -> float:
     """Find the largest torque [N m] among measured inputs and outputs; 0 where there is none."""
     inputs = [str(one["input"]) for one in elements if one["type"] == "torque"]

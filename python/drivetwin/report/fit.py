@@ -19,9 +19,9 @@ from drivetwin.estimation.result.estimate import Z95, SignalFit
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.fit import HeldOut
+from drivetwin.fit.plant import NetworkTerm
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.result import ModelFit, MovedNumber
-from drivetwin.fit.term import NetworkTerm
 from drivetwin.report.blocks import (
     Block,
     Cell,
@@ -113,7 +113,7 @@ def build_prediction_blocks(found: HeldOut, log: str) -> list[Block]:
 
 def render_prediction(found: HeldOut, model: str, log: str) -> str:
     """HTML text of the page of a recording that a fitted model predicts."""
-    figure = plot_recording(found.term, found.point, found.term.simulate(found.point))
+    figure = plot_recording(found.term, found.point, found.term.build_task(found.point).simulate())
     blocks = [*build_prediction_blocks(found, log), FigureBlock(figure, f"{log}.")]
     section = Section("recordings", "Recording", "Measured and simulated quantities.", blocks)
     return render_page(f"{model}: simulation of {log}", "by the values of a fit", [section])
@@ -162,7 +162,7 @@ def _build_fixed_row(one: MovedNumber) -> tuple[str, ...]:
 def plot_recording(term: NetworkTerm, point: ParameterVector, run: NetworkRun) -> Figure:
     """Draw the outputs of a recording, measured and simulated, and the inputs below."""
     panels = []
-    shown = term.plant.show_outputs(point, run.time, run.columns)
+    shown = term.show(point, run.columns)
     for out in term.record.outputs:
         output = term.plant.outputs[out.name]
         curves = [

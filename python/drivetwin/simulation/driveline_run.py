@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
@@ -30,10 +28,8 @@ from drivetwin.simulation.dual_clutch import (
     Trajectory,
     collect_inputs,
 )
-from drivetwin.simulation.network import NetworkRun, Output, Start, build_element
+from drivetwin.simulation.network import NetworkRun, Output, Start
 from drivetwin.simulation.network import simulate as simulate_network
-from drivetwin.simulation.network_response import NetworkResponse, compute_response
-from drivetwin.simulation.network_sensitivity import NetworkTask
 
 COMPARED: Mapping[str, Output] = {
     "output_torque": ("shaft_torque", SHAFT),
@@ -85,45 +81,6 @@ class DrivelineTask:
         """
         elements = build_driveline(self.model, self.added)
         return simulate_network(elements, self.inputs, self._build_start(), self.time, outputs)
-
-    def differentiate(self, count: int) -> tuple[Trajectory, Mapping[Output, FloatArray]]:
-        """Simulate, and differentiate by the `count` unknowns of the variables in the task.
-
-        Returns
-        -------
-        tuple of Trajectory and mapping
-            The run, and the derivatives (n, count) of `COMPARED`.
-
-        Raises
-        ------
-        InputError
-            Where the description is inconsistent.
-        """
-        task = NetworkTask(
-            build_driveline(self.model, self.added),
-            self.inputs,
-            self._build_start(),
-            self.time,
-            self._list_outputs(),
-        )
-        found = task.differentiate(count, tuple(COMPARED.values()))
-        return build_trajectory(found.run, self.names), found.derivatives
-
-    def respond(self, nodes: Sequence[str] = ()) -> NetworkResponse | None:
-        """Compute the linear response of `COMPARED` to small disturbances around the run.
-
-        An input of the name of each of `nodes` is a torque [N m] on it. None where the run does not
-        reach its end. Raises InputError where the description is inconsistent.
-        """
-        pushes = [build_element("torque", f"push {one}", node=one, input=one) for one in nodes]
-        still = Signal(self.time[[0, -1]], np.zeros(2))
-        return compute_response(
-            [*build_driveline(self.model, self.added), *pushes],
-            {**self.inputs, **dict.fromkeys(nodes, still)},
-            self._build_start(),
-            self.time,
-            tuple(COMPARED.values()),
-        )
 
     def _list_outputs(self) -> list[Output]:
         crank: list[Output] = [] if self.added.front is None else [("speed", CRANK)]

@@ -35,6 +35,7 @@ from drivetwin.simulation.network import (
     Start,
     combine_columns,
     resolve_outputs,
+    simulate,
     to_core_sines,
 )
 from drivetwin.simulation.serialize import as_json, as_names, is_number, require_number
@@ -87,17 +88,19 @@ class NetworkTask:
     outputs: Sequence[Output]
     accuracy: Accuracy = field(default_factory=Accuracy)
 
-    def differentiate(
-        self, count: int, wanted: Sequence[Output] | None = None
-    ) -> NetworkSensitivities:
+    def simulate(self) -> NetworkRun:
+        """Simulate; a failed run returns its status. Raises InputError for an impossible
+        description."""
+        given = (self.elements, self.inputs, self.start, self.time, self.outputs)
+        return simulate(*given, accuracy=self.accuracy)
+
+    def differentiate(self, count: int) -> NetworkSensitivities:
         """Simulate, and differentiate by the unknowns of the variables.
 
         Parameters
         ----------
         count
             Number of unknowns; they are named by their numbers.
-        wanted
-            Outputs whose derivatives are formed, by default all.
 
         Returns
         -------
@@ -117,14 +120,12 @@ class NetworkTask:
         values = combine_columns(requests, found[0].values)
         columns = dict(zip(self.outputs, values, strict=True))
         run = NetworkRun(self.time, columns, events, found[0].status, None)
-        kept = self.outputs if wanted is None else wanted
-        derivatives = {output: np.zeros((self.time.size, count)) for output in kept}
+        derivatives = {output: np.zeros((self.time.size, count)) for output in self.outputs}
         event_times = np.zeros((len(events), count))
         for lanes, one in zip(passes, found, strict=True):
             slopes = combine_columns(requests, one.slopes)
             for output, column in zip(self.outputs, slopes, strict=True):
-                if output in derivatives:
-                    derivatives[output][:, lanes] = column[:, : len(lanes)]
+                derivatives[output][:, lanes] = column[:, : len(lanes)]
             if events:
                 event_times[:, lanes] = one.event_times[:, : len(lanes)]
         unknowns = tuple(str(k) for k in range(count))

@@ -95,7 +95,7 @@ def test_derivatives_by_all_other_unknowns_are_exact() -> None:
 
 def test_an_idle_drum_turns_with_the_shift() -> None:
     posed, point = _add_idle_drum()
-    assert posed.terms[0].structure.build_model(point).elements[2].drum_inertia == 0.2
+    assert posed.terms[0].plant.build_model(point).elements[2].drum_inertia == 0.2
     _assert_exact(posed, point, ["K2.drum"])
 
 
@@ -152,7 +152,7 @@ def test_the_law_of_the_offgoing_element_is_a_level_of_its_partners() -> None:
     posed, point = problem(bench())
     values = point.values.copy()
     values[point.names.index("B2.level")], values[point.names.index("B2.rest")] = 1.1, 0.01
-    model = posed.terms[0].structure.build_model(point.replace_values(values))
+    model = posed.terms[0].plant.build_model(point.replace_values(values))
     laws = {one.name: one.friction for one in model.elements}
     own, partner = laws["B2"], laws["B3"]
     assert isinstance(own, Stribeck)

@@ -60,7 +60,7 @@ def test_a_prior_on_the_engine_inertia_is_one_on_its_share_of_je() -> None:
 
 def test_an_exact_ratio_or_fixed_value_is_no_unknown() -> None:
     posed, start = _pose(known={"k_o": PriorValue(0.5)})
-    assert posed.terms[0].structure.get_value(start, "k_o") == 0.5
+    assert posed.terms[0].plant.get_value(start, "k_o") == 0.5
     assert not {"k_o", "ratio_2", "ratio_3", "i_f"} & set(start.names)
 
 

@@ -26,7 +26,8 @@ from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.data.output import Output
-from drivetwin.estimation.likelihood.data.shift_record import RECORD, ShiftRecord
+from drivetwin.estimation.likelihood.data.recorded_data import RECORD
+from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
@@ -95,11 +96,11 @@ def plan_experiment(experiment: Experiment, base: BaseShift) -> ExperimentPlan:
     """Build an experiment that starts like the log; its outputs hold no measurements."""
     term, point = base.term, base.point
     label = "next"
-    starts = [name for name in point.names if name.startswith(f"{term.structure.label}.")]
+    starts = [name for name in point.names if name.startswith(f"{term.plant.label}.")]
     renamed = [f"{label}.{name.rpartition('.')[2]}" for name in starts]
     values = np.concatenate([point.values, [point[name] for name in starts]])
     extended = ParameterVector((*point.names, *renamed), values)
-    structure = replace(term.structure, label=label)
+    structure = replace(term.plant, label=label)
     record = _RECORDS[experiment](base)
     return ExperimentPlan(experiment, ShiftTerm.from_sensor_noise(structure, record), extended)
 
@@ -126,17 +127,17 @@ def _build_coast_down(base: BaseShift) -> ShiftRecord:
 
 
 def _build_torque_level(base: BaseShift) -> ShiftRecord:
-    elements = base.term.structure.elements
+    elements = base.term.plant.elements
     scaled = _scale_pressures(base, {one.name: TORQUE_LEVEL for one in elements})
     return _replace_torque(scaled, lambda _, values: TORQUE_LEVEL * values)
 
 
 def _build_firmer_shift(base: BaseShift) -> ShiftRecord:
-    return _scale_pressures(base, {base.term.structure.driveline.oncoming.name: FIRMER})
+    return _scale_pressures(base, {base.term.plant.driveline.oncoming.name: FIRMER})
 
 
 def _build_softer_shift(base: BaseShift) -> ShiftRecord:
-    return _scale_pressures(base, {base.term.structure.driveline.oncoming.name: SOFTER})
+    return _scale_pressures(base, {base.term.plant.driveline.oncoming.name: SOFTER})
 
 
 def _build_still_pedal(base: BaseShift) -> ShiftRecord:
@@ -165,11 +166,11 @@ def _scale_pressures(base: BaseShift, factors: Mapping[str, float]) -> ShiftReco
     """Multiply the pressures above P0 of some elements."""
     pressures = dict(base.record.pressures)
     for name, factor in factors.items():
-        P0 = base.term.structure.get_value(base.point, f"{name}.P0")
+        P0 = base.term.plant.get_value(base.point, f"{name}.P0")
         signal = pressures[name]
         values = np.where(signal.values > P0, P0 + factor * (signal.values - P0), signal.values)
         pressures[name] = Signal(signal.time, values)
-    return replace(base.record, pressures=pressures)
+    return replace(base.record, inputs={**base.record.inputs, **pressures})
 
 
 def _replace_torque(
@@ -180,12 +181,12 @@ def _replace_torque(
         Signal(signal.time, change(signal.time, signal.values))
         for signal in (record.engine_torque, record.steady_torque)
     )
-    return replace(record, engine_torque=torque, steady_torque=steady)
+    return replace(record, inputs={**record.inputs, TORQUE: torque}, steady_torque=steady)
 
 
 def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> ShiftRecord:
     """Build a record of the off-going element's gear alone, with the rates and noise of the log."""
-    record, driveline = base.record, base.term.structure.driveline
+    record, driveline = base.record, base.term.plant.driveline
     step = float(np.median(np.diff(record.time)))
     time = step * np.arange(int(length / step), dtype=np.float64)
     period = float(np.median(np.diff(record.engine_torque.time)))
@@ -199,13 +200,18 @@ def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> ShiftR
         name: _make_constant(np.append(np.arange(0.0, length, raster[name]), ends[1]), level)
         for name, level in levels.items()
     }
+    inputs = {TORQUE: torque, **pressures}
+    nothing = {name: np.zeros(one.time.size) for name, one in inputs.items()}
     return ShiftRecord(
         time,
-        torque,
-        pressures,
         tuple(_make_empty_output(out, record.time, time) for out in record.outputs),
+        inputs,
+        {name: none + record.input_sigma[name] ** 2 for name, none in nothing.items()},
+        nothing,
+        nothing,
+        {name: np.ones(none.size, dtype=np.intp) for name, none in nothing.items()},
         torque,
-        np.zeros(torque.time.size),
+        nothing[TORQUE],
         record.input_sigma,
     )
 
@@ -266,8 +272,8 @@ def _find_shifts(name: str, fit: LikelihoodFit) -> tuple[int, ...]:
     last, element = len(terms) - 1, name.partition(".")[2]
     with_it: dict[bool, int] = {}
     for k, one in enumerate(terms):
-        structure = one.structure
-        if structure.log == terms[last].structure.log:
+        structure = one.plant
+        if structure.log == terms[last].plant.log:
             for role in structure.elements:
                 if role.name == element:
                     with_it[role is structure.driveline.oncoming] = k
@@ -336,7 +342,7 @@ def _compute_gains(
 def _get_delay_name(fit: LikelihoodFit) -> str:
     """Return the name of the torque-delay unknown of the last log, whose sensors experiments
     share."""
-    return fit.problem.terms[-1].structure.get_unknown(DELAY)
+    return fit.problem.terms[-1].plant.get_unknown(DELAY)
 
 
 def _add_delay(fit: LikelihoodFit) -> ParameterVector:
@@ -344,7 +350,7 @@ def _add_delay(fit: LikelihoodFit) -> ParameterVector:
     point, name = fit.point, _get_delay_name(fit)
     if name in point.names:
         return point
-    delay = fit.problem.terms[-1].structure.get_value(point, DELAY)
+    delay = fit.problem.terms[-1].plant.get_value(point, DELAY)
     return ParameterVector((*point.names, name), np.append(point.values, delay))
 
 
@@ -394,7 +400,7 @@ class _Linearisation:
     def get_row(self, name: str, names: tuple[str, ...]) -> FloatArray:
         """Return the derivative (r,) of a parameter by the unknowns `names`."""
         row = np.zeros(len(names))
-        if name == make_log_id(DELAY, self.fit.problem.terms[-1].structure.log):
+        if name == make_log_id(DELAY, self.fit.problem.terms[-1].plant.log):
             row[names.index(_get_delay_name(self.fit))] = 1.0
             return row
         row[: len(self.fit.point.names)] = self.jacobian[list(self.values).index(name)]

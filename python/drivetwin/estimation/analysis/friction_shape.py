@@ -170,7 +170,7 @@ def _build_problem(
 def _get_law(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
     """Return the friction law of an element at the minimum."""
     for term in base.problem.terms:
-        for one in term.structure.build_model(base.point).elements:
+        for one in term.plant.build_model(base.point).elements:
             if one.name == name:
                 return one.friction
     raise IdentificationError(
@@ -182,7 +182,7 @@ def _replace_laws(
     term: ShiftTerm, base: LikelihoodFit, tables: Mapping[str, KnotTable]
 ) -> ShiftTerm:
     """Replace the laws of a term by tables."""
-    old = term.structure
+    old = term.plant
     laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
     fixed = {**old.fixed, **{name: old.get_value(base.point, name) for name in laws}}
     mine = {one.name: tables[one.name] for one in old.elements if one.name in tables}

@@ -109,8 +109,8 @@ def predict_spread(
         if run is None:
             found.append({})
             continue
-        averaged = term.record.sample_run(run) - term.record.sample_stamps(run)
-        mean = term.compute_residual(run) - residual + averaged
+        simulated = term.record.sample_stamps(run)
+        mean = term.record.measured - term.returned - residual - simulated
         rows = join_columns(slopes, z)
         acting = find_acting(rows)
         spread = propagate_variance(rows[:, acting], joint[np.ix_(acting, acting)])
@@ -309,7 +309,7 @@ def _check_levels(fit: LikelihoodFit, corrected: Correction) -> list[Finding]:
     """Report an element whose friction level contradicts that of its partner: one of the gains is
     likely wrong."""
     found = []
-    for name, partner in fit.problem.terms[0].structure.partners.items():
+    for name, partner in fit.problem.terms[0].plant.partners.items():
         unknown, prior = f"{name}.level", fit.problem.prior
         if unknown not in fit.point.names:
             continue
@@ -338,7 +338,7 @@ def _estimate_delays(
     """Build the estimates of delays that the fit holds fixed: those of an engine torque that hardly
     moves."""
     found: dict[str, Estimate] = {}
-    for one in (term.structure for term in fit.problem.terms):
+    for one in (term.plant for term in fit.problem.terms):
         if one.get_unknown(DELAY) not in fit.point.names and DELAY not in drivelines[0].known:
             name = make_log_id(DELAY, one.log)
             found[name] = refuse_parameter(name, METHOD, explain(Code.DELAY_NOT_EXCITED))
@@ -351,7 +351,7 @@ def _build_load_law(fit: LikelihoodFit, corrected: Correction) -> LoadLaw | None
         return None
     k, term = fit.point.names.index(AERO), fit.problem.terms[0]
     std = float(np.sqrt(corrected.covariance[k, k]))
-    mean_speed = term.structure.mean_speed
+    mean_speed = term.plant.mean_speed
     return LoadLaw(corrected.mean[AERO], std, mean_speed, over_eta=not term.scale_known)
 
 

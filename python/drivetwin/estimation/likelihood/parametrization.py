@@ -29,6 +29,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
 from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.direct.load_balance import AERO
+from drivetwin.estimation.likelihood.term import RecordedPlant
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.simulation.added_elements import (
@@ -43,14 +44,19 @@ from drivetwin.simulation.added_elements import (
     build_added_elements,
     compute_gap,
 )
+from drivetwin.simulation.driveline import build_driveline, build_start
+from drivetwin.simulation.driveline_run import COMPARED
 from drivetwin.simulation.dual_clutch import (
+    ENGINE_TORQUE,
     DualClutch,
     LossLaw,
     RoadLoad,
     ShiftElement,
+    Signal,
     State,
     Stribeck,
 )
+from drivetwin.simulation.network_sensitivity import NetworkTask
 from drivetwin.simulation.variable import exp
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue
@@ -183,7 +189,7 @@ class Tie:
 
 
 @dataclass(frozen=True)
-class ShiftModel:
+class ShiftModel(RecordedPlant):
     """Fixed description of one shift: its elements and every value that is not estimated.
 
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
@@ -195,6 +201,7 @@ class ShiftModel:
     are the elements whose law an element without a law of its own follows, by its name.
     """
 
+    outputs = COMPARED
     driveline: KnownDriveline
     loss_law: LossLaw
     label: str
@@ -321,6 +328,38 @@ class ShiftModel:
         drum = self.get_value(point, f"{one.name}.drum")
         law = Stribeck(*NO_LAW)
         return ShiftElement(one.name, 1.0 / one.a, one.b, one.gain, one.P0.value, law, 1.0, drum)
+
+    def build_task(
+        self,
+        point: ParameterVector,
+        inputs: Mapping[str, Signal],
+        time: FloatArray,
+        added: AddedElements | None = None,
+    ) -> NetworkTask:
+        """Build the run at `point` over `time` (N,) [s], driven by measured `inputs`.
+
+        `added` take the place of the elements beside the dual clutch. Elements that stay open have
+        no pressure. Neither delay nor error of the engine torque carry derivatives.
+        """
+        model = self.build_model(point)
+        added = self.build_added_elements(point, model) if added is None else added
+        idle = dict.fromkeys((e.name for e in self.spinning), Signal(time[[0, -1]], np.zeros(2)))
+        acting = {**idle, **inputs, ENGINE_TORQUE: self.place_torque(point, inputs[ENGINE_TORQUE])}
+        begin = self.build_start(point)
+        start = build_start(model, added, begin, acting[ENGINE_TORQUE], float(time[0]))
+        elements = build_driveline(model, added)
+        return NetworkTask(elements, acting, start, time, list(COMPARED.values()))
+
+    def place_torque(self, point: ParameterVector, read: Signal) -> Signal:
+        """Return the engine torque as it acts: less its mean error, advanced by its delay."""
+        offset = self.get_unknown(TE_OFFSET)
+        error = float(point[offset]) if offset in point.names else 0.0
+        return Signal(read.time, read.values - error, -float(self.get_value(point, "te_delay")))
+
+    def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
+        """Return the delay [s] of each of `inputs` at `point`."""
+        torque = -float(self.get_value(point, "te_delay"))
+        return dict.fromkeys(inputs, 0.0) | {ENGINE_TORQUE: torque}
 
     def build_start(self, point: ParameterVector) -> State:
         """Build the initial state of the run at `point`: the off-going element is locked."""

@@ -33,7 +33,8 @@ from drivetwin.estimation.direct.friction_law import LAW_PRIOR
 from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute_mean_speed
 from drivetwin.estimation.direct.momentum_balance import DELAY
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
-from drivetwin.estimation.likelihood.data.shift_record import RECORD, build_record
+from drivetwin.estimation.likelihood.data.recorded_data import RECORD
+from drivetwin.estimation.likelihood.data.shift_record import build_record
 from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,

@@ -37,7 +37,7 @@ def evaluate_contact(
 ) -> Contact:
     """Evaluate element `name` along `run`, the simulation of the term at `point`."""
     middle = 0.5 * (run.time[1:] + run.time[:-1])
-    model = term.structure.build_model(point)
+    model = term.plant.build_model(point)
     one = next((e for e in model.elements if e.name == name), None)
     if one is None or name not in term.record.pressures:
         nothing = np.zeros(middle.size)

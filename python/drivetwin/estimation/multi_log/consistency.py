@@ -115,7 +115,7 @@ def check_consistency(
 
 def find_shared(fit: LikelihoodFit) -> list[int]:
     """Return the indices of the unknowns that all logs share."""
-    structures = [term.structure for term in fit.problem.terms]
+    structures = [term.plant for term in fit.problem.terms]
     own = {name for one in structures for name in map_log_names(one.log).values()}
     starts = {f"{one.label}.{key}" for one in structures for key in RUN_SPECIFIC}
     return [k for k, name in enumerate(fit.point.names) if name not in own | starts]
@@ -129,7 +129,7 @@ def _compute_column_products(
     Raises IdentificationError where a simulation that the fit had made does not run again.
     """
     size = len(fit.point.names)
-    terms = tuple(term for term in fit.problem.terms if term.structure.log == log)
+    terms = tuple(term for term in fit.problem.terms if term.plant.log == log)
     prior = fit.problem.prior
     own = [k for k, name in enumerate(fit.point.names) if name in map_log_names(log).values()]
     precision = np.zeros((size, size))

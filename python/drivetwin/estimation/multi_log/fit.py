@@ -150,7 +150,7 @@ def compute_start(alone: Sequence[Identification]) -> dict[str, float]:
     fits = [get_likelihood_fit(one)[0] for one in alone]
     values: dict[str, float] = {}
     for k, fit in enumerate(fits, 1):
-        structures = [term.structure for term in fit.problem.terms]
+        structures = [term.plant for term in fit.problem.terms]
         known = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
         known = {**structures[0].fixed, **known}
         own = {name: known.pop(name) for name in LOG_SPECIFIC if name in known}
@@ -181,7 +181,7 @@ _SharedMean = tuple[list[str], FloatArray, FloatArray]
 
 def _compute_shared_mean(fit: LikelihoodFit) -> _SharedMean:
     """Names, values (s,) and information (s, s) of what a log shares with others."""
-    starts = {f"{term.structure.label}.{key}" for term in fit.problem.terms for key in RUN_SPECIFIC}
+    starts = {f"{term.plant.label}.{key}" for term in fit.problem.terms for key in RUN_SPECIFIC}
     keep = [
         k for k, name in enumerate(fit.point.names) if name not in {*starts, *LOG_SPECIFIC, AERO}
     ]
@@ -222,9 +222,9 @@ def find_largest_differences(alone: Sequence[Identification]) -> list[str]:
 def _build_log_share(
     number: int, log: PreparedLog, alone: Identification, fit: LikelihoodFit
 ) -> LogShare:
-    mine = next(term for term in fit.problem.terms if term.structure.log == number)
+    mine = next(term for term in fit.problem.terms if term.plant.log == number)
     return LogShare(
-        number, log.source, log.sha256, alone.shifts, alone.estimates, mine.structure.mean_speed
+        number, log.source, log.sha256, alone.shifts, alone.estimates, mine.plant.mean_speed
     )
 
 

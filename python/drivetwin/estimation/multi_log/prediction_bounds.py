@@ -98,9 +98,9 @@ def predict_shifts(
     return tuple(
         ShiftPrediction(
             known,
-            term.structure.mean_speed,
+            term.plant.mean_speed,
             float(term.record.time[0]),
-            term.structure.build_start(point),
+            term.plant.build_start(point),
             _compute_bounds(term, point, moved, rng) if _has_law(fit, term) else {},
         )
         for term in problem.terms
@@ -109,7 +109,7 @@ def predict_shifts(
 
 def _has_law(fit: LikelihoodFit, term: ShiftTerm) -> bool:
     """Return whether the fit identifies the friction of the on-coming element."""
-    return f"{term.structure.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
+    return f"{term.plant.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
 
 
 def _collect_values(fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]) -> dict[str, float]:
@@ -119,7 +119,7 @@ def _collect_values(fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]) ->
     """
     known: dict[str, float] = {}
     for term in fit.problem.terms:
-        known |= term.structure.fixed
+        known |= term.plant.fixed
     known |= dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
     if AERO not in fit.point.names:
         known.pop(AERO, None)
@@ -139,7 +139,7 @@ def _find_new_unknowns(
 ) -> list[int]:
     """Return the indices of the unknowns that belong to the log or the run and are not in the
     fit."""
-    structures = [term.structure for term in problem.terms]
+    structures = [term.plant for term in problem.terms]
     starts = {f"{one.label}.{key}" for one in structures for key in START}
     own = {name for one in structures for name in map_log_names(one.log).values()}
     mine = starts | (own - set(fit.point.names))

@@ -38,7 +38,7 @@ def test_an_input_without_noise_has_that_of_an_ideal_sensor(level: float) -> Non
     record = _build(engine_torque=replace(torque, values=values, sigma=0.0))
     assert record.input_sigma[TORQUE] == pytest.approx(LEAST * abs(values).max())
     for name, pressure in bench().signals.pressures.items():
-        assert record.input_sigma[name] == pressure.sigma
+        assert record.input_sigma[name] == pytest.approx(pressure.sigma)
 
 
 def test_an_output_that_stopped_before_a_shift_is_not_compared_in_it() -> None:
@@ -64,15 +64,17 @@ def test_each_stay_at_a_level_has_an_error_of_its_own() -> None:
         values=np.where(time < 2.395, 110.0, 121.0),
         sigma=STEP / np.sqrt(12.0),
     )
-    found = _build(engine_torque=torque, torque_resolution=STEP).rounding[TORQUE]
+    record = _build(engine_torque=torque, torque_resolution=STEP)
+    rounding = record.input_variance[TORQUE] - record.input_sigma[TORQUE] ** 2
     # The mean over a stay of independent samples with this noise is off by the error of one.
-    for of_stay in (0, 1):
-        sigma = found.sigma[found.stay == of_stay]
-        assert sigma / np.sqrt(sigma.size) == pytest.approx(found.error)
-    assert np.unique(found.draw(np.random.default_rng(1))).size == 2
+    stays = record.engine_torque.values < 115.0
+    errors = [np.sqrt(np.mean(rounding[one]) / np.count_nonzero(one)) for one in (stays, ~stays)]
+    assert errors[0] == pytest.approx(errors[1])
+    assert errors[0] == pytest.approx(STEP / np.sqrt(12.0), rel=0.1)
     dithered = torque.values + 2.0 * STEP * np.random.default_rng(1).standard_normal(time.size)
     loud = replace(torque, values=np.round(dithered / STEP) * STEP, sigma=2.0 * STEP)
-    assert TORQUE not in _build(engine_torque=loud, torque_resolution=STEP).rounding
+    record = _build(engine_torque=loud, torque_resolution=STEP)
+    assert record.input_variance[TORQUE] == pytest.approx(record.input_sigma[TORQUE] ** 2)
 
 
 def test_a_mean_is_that_of_the_motion_since_the_sample_before() -> None:

@@ -61,7 +61,7 @@ def _add_drum(at: Any, model: DualClutch, torque: Signal) -> tuple[DualClutch, S
 def _grow(at: Any, model: DualClutch, torque: Signal) -> tuple[DualClutch, Signal]:
     """A load that grows with the speed is the constant one at the mean speed."""
     share = SMALL * EFFECTS[EffectId.AERO_LOAD].std * at.load * model.i_f
-    aero = model.load.aero + share / at.term.structure.mean_speed**2
+    aero = model.load.aero + share / at.term.plant.mean_speed**2
     load = RoadLoad(model.load.constant - share, model.load.rolling, aero)
     return replace(model, load=load), torque
 
@@ -77,12 +77,12 @@ def _grow(at: Any, model: DualClutch, torque: Signal) -> tuple[DualClutch, Signa
 def test_a_column_is_the_change_of_a_run(
     effect: EffectId, change: Change, rtol: float, at: Any
 ) -> None:
-    term, torque = at.term, at.term.get_acting_torque(at.point)
-    begin = term.structure.build_start(at.point)
+    term, acts = at.term, at.term.build_task(at.point).inputs
+    torque = acts["engine torque"]
+    pressures = {name: one for name, one in acts.items() if name != "engine torque"}
+    begin = term.plant.build_start(at.point)
     plain, changed = (
-        term.record.sample_run(
-            simulate(model, signal, term.get_pressures(), begin, term.record.time)
-        )
+        term.record.sample_run(simulate(model, signal, pressures, begin, term.record.time))
         for model, signal in ((at.model, torque), change(at, at.model, torque))
     )
     column = SMALL * observe(at, EFFECTS[effect].build(at, EFFECTS[effect].std)[:1])[:, 0]
@@ -120,7 +120,7 @@ def _integrate(
         slip = ratio / (model.i_in * one.i_c) - one.i_out  # slip per output speed, of the open one
         output += one.drum_inertia * slip**2
     first, length = at.run.time[0], at.duration
-    drag = STD * abs(at.term.structure.get_value(at.point, "Tv_over_if")) * model.i_f
+    drag = STD * abs(at.term.plant.get_value(at.point, "Tv_over_if")) * model.i_f
 
     def shaft(z: FloatArray) -> FloatArray:
         return np.asarray(model.k_o * z[2] + model.c_o * (z[0] - model.i_f * z[1]))
@@ -167,7 +167,7 @@ def test_the_slower_torque_is_the_lagged_faster_one(size: float, at: Any) -> Non
     Both are without the delay, which is an unknown of its own.
     """
     steady, time = at.record.steady_torque, at.middle
-    age = at.term.structure.get_value(at.point, "te_delay")
+    age = at.term.plant.get_value(at.point, "te_delay")
     fine = np.arange(time[0], time[-1], 2e-4)
     logged = np.interp(fine + age, steady.time, steady.values)
     (found,) = EFFECTS[EffectId.TORQUE_LAG].build(at, size)

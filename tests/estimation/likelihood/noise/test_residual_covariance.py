@@ -47,8 +47,10 @@ def _select_speeds(term: Any, slope: float, rest: float) -> Any:
     torque = Signal(record.time, np.interp(record.time, read.time, read.values))
     size = np.linspace(0.5, 1.5, record.time.size)
     share = TorqueOfSpeeds(record.time, size * slope, size * rest)
-    sigma = {**record.input_sigma, TORQUE: rest}
-    made = replace(record, engine_torque=torque, of_speeds=share, input_sigma=sigma, rounding={})
+    variance = {**record.input_variance, TORQUE: (size * rest) ** 2}
+    held = {**record.held_back, TORQUE: np.zeros(size.size)}
+    inputs = {**record.inputs, TORQUE: torque}
+    made = replace(record, inputs=inputs, of_speeds=share, input_variance=variance, held_back=held)
     return replace(term, record=made)
 
 
@@ -112,12 +114,16 @@ def _sparse(every: int) -> tuple[Any, Any]:
     outputs = tuple(
         replace(out, place=out.place[::every], values=out.values[::every]) for out in record.outputs
     )
-    pressures = {
-        name: Signal(p.time[::every], p.values[::every]) for name, p in record.pressures.items()
-    }
-    sigma = {**record.input_sigma, TORQUE: 0.03}
-    sparse = replace(record, outputs=outputs, pressures=pressures, input_sigma=sigma, held_back={})
-    return term.from_sensor_noise(term.structure, sparse).update_weighting(start), start
+    inputs, variance = dict(record.inputs), dict(record.input_variance)
+    for name, p in record.pressures.items():
+        inputs[name] = Signal(p.time[::every], p.values[::every])
+        variance[name] = variance[name][::every]
+    variance[TORQUE] = np.full(inputs[TORQUE].time.size, 0.03**2)
+    held = {name: np.zeros(one.time.size) for name, one in inputs.items()}
+    sparse = replace(
+        record, outputs=outputs, inputs=inputs, input_variance=variance, held_back=held
+    )
+    return term.from_sensor_noise(term.plant, sparse).update_weighting(start), start
 
 
 def _filtered(term: Any, columns: FloatArray) -> FloatArray:
@@ -172,9 +178,10 @@ def test_without_input_noise_the_sensors_weigh_alone() -> None:
 def test_pressures_count_beside_a_still_engine_torque_and_no_output_torque() -> None:
     term, point = _short()
     speeds = tuple(one for one in term.record.outputs if one.name.endswith("speed"))
-    silent = {**term.record.input_sigma, TORQUE: 0.0}
-    record = replace(term.record, outputs=speeds, input_sigma=silent)
-    weighted = term.from_sensor_noise(term.structure, record).update_weighting(point)
+    variance = term.record.input_variance
+    silent = {**variance, TORQUE: np.zeros(variance[TORQUE].size)}
+    record = replace(term.record, outputs=speeds, input_variance=silent)
+    weighted = term.from_sensor_noise(term.plant, record).update_weighting(point)
     assert weighted.weighting.path is not None
 
 
@@ -198,15 +205,12 @@ def test_what_is_held_back_acts_on_the_residual_as_on_a_run() -> None:
     posed, truth = problem(bench())
     term = posed.cut([bench().signals.shift.lockup_time - 0.02]).terms[0]
     small = {name: 0.05 * values for name, values in term.record.held_back.items()}
-    whole = {
-        name: Signal(p.time, p.values + small[name]) for name, p in term.record.pressures.items()
-    }
+    whole = {name: Signal(p.time, p.values + small[name]) for name, p in term.record.inputs.items()}
     smooth = replace(term, record=replace(term.record, held_back=small))
-    read = replace(term, record=replace(term.record, pressures=whole, held_back={}))
-    runs = smooth.simulate(truth), read.simulate(truth)
-    before = smooth.compute_residual(runs[0])
-    expected = (read.compute_residual(runs[1]) - before) / term.record.sigma
-    found = (smooth.update_weighting(truth).compute_residual(runs[0]) - before) / term.record.sigma
+    read = replace(term, record=replace(term.record, inputs=whole))
+    before = smooth.evaluate(truth)
+    expected = (read.evaluate(truth) - before) / term.record.sigma
+    found = (smooth.update_weighting(truth).evaluate(truth) - before) / term.record.sigma
     assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
 
 
@@ -216,7 +220,8 @@ def test_expected_noise_of_samples_is_the_transpose_of_interpolation() -> None:
     steps = {
         name: rng.standard_normal(record.time.size - 1) for name in (TORQUE, *record.pressures)
     }
-    held = record.subtract_noise(steps, 0.007).held_back[TORQUE] - record.held_back.get(TORQUE, 0.0)
+    delays = dict.fromkeys(record.pressures, 0.0) | {TORQUE: -0.007}
+    held = record.subtract_noise(steps, delays).held_back[TORQUE] - record.held_back[TORQUE]
     stamps = record.engine_torque.time - 0.007
     values = rng.standard_normal(stamps.size)
     middle = 0.5 * (record.time[1:] + record.time[:-1])

@@ -30,13 +30,10 @@ def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         return size * np.asarray((time > start) & (time < start + 0.2), dtype=float)
 
-    inputs = {"engine torque": term.record.engine_torque} | dict(term.record.pressures)
+    inputs = dict(term.record.inputs)
     old = inputs[name]
     new = Signal(old.time, old.values + bump(old.time))
-    if name == "engine torque":
-        record = replace(term.record, engine_torque=new)
-    else:
-        record = replace(term.record, pressures={**term.record.pressures, name: new})
+    record = replace(term.record, inputs={**inputs, name: new})
     run = replace(term, record=record).simulate(point)
     assert run is not None
     middle = 0.5 * (base.time[1:] + base.time[:-1])
@@ -63,7 +60,7 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: Any) ->
     term, shift = posed.terms[0], made.signals.shift
     base = term.simulate(point)
     assert base is not None
-    old, age = term.record.engine_torque, term.structure.get_value(point, "te_delay")
+    old, age = term.record.engine_torque, term.plant.get_value(point, "te_delay")
     middle = 0.5 * (base.time[1:] + base.time[:-1])
     time = np.concatenate([base.time[out.place] for out in term.record.outputs])
     clear = np.abs(time - shift.lockup_time) > 0.003
@@ -74,7 +71,8 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: Any) ->
     )
     for start, length in spans:
         bump = 0.5 * ((old.time > start) & (old.time < start + length))
-        moved = replace(term.record, engine_torque=Signal(old.time, old.values + bump))
+        torque = Signal(old.time, old.values + bump)
+        moved = replace(term.record, inputs={**term.record.inputs, "engine torque": torque})
         run = replace(term, record=moved).simulate(point)
         assert run is not None
         change = np.interp(middle + age, old.time, bump)
@@ -94,7 +92,7 @@ def test_no_slip_is_left_over_wherever_in_a_step_the_element_locks(level: float)
     run = term.simulate(point)
     assert run is not None
     lock = next(event.time for event in run.events if event.kind == "lock")
-    model = term.structure.build_model(point)
+    model = term.plant.build_model(point)
     element = next(one for one in model.elements if one.name == "B3")
     disturbance = {"engine torque": np.ones(run.time.size - 1)}
     z = term.compute_response(point).propagate_inputs(disturbance)

@@ -89,8 +89,8 @@ def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
     made = bench()
     posed, start = problem(made)
     term = posed.terms[0]
-    fixed = {**term.structure.fixed, "i_f": 1.3 * term.structure.driveline.i_f}
-    wrong = replace(term, structure=replace(term.structure, fixed=fixed))
+    fixed = {**term.plant.fixed, "i_f": 1.3 * term.plant.driveline.i_f}
+    wrong = replace(term, plant=replace(term.plant, fixed=fixed))
     with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
         fit_multistart(replace(posed, terms=(wrong,)), start, [made.signals.shift])
 

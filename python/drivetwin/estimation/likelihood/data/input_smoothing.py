@@ -60,27 +60,27 @@ def smooth_pressure(pressure: MeasuredSignal, fill: PriorValue | None = None) ->
     """Remove the fast noise of a pressure (n,); corners too sharp for a local cubic stay as read.
 
     `fill` is P0 [Pa] as the card has it: about it the noise is taken off that a longer cubic takes.
-    """
-    smooth = smooth_local_cubic(pressure.time, pressure.values)
-    apart = np.abs(pressure.values - smooth) > SMOOTHING.corner_sigma * pressure.sigma
-    if fill is not None:
-        steady = _select_steady(pressure)
-        band = SMOOTHING.fill_sigma * pressure.sigma + 2.0 * fill.std
-        smooth = np.where(np.abs(steady - fill.value) < band, steady, smooth)
-    return np.where(_spread(apart, _count_samples(pressure.time)), pressure.values, smooth)
-
-
-def _select_steady(pressure: MeasuredSignal) -> FloatArray:
-    """Compute the middle (n,) of the longest cubic about each sample that agrees with all shorter
-    ones, that over `SMOOTHING.window` the shortest.
-
     Pressure noise about P0 gives the fit many minima. In each of them the noise switches the torque
     on and off, which is mistaken for information that separates P0 from μ. At 5 kPa above P0 an
     estimate may be four standard deviations off.
     """
-    shortest = _count_samples(pressure.time)
-    sizes = [shortest, *_list_longer(pressure.time, shortest)]
-    return smooth_windows(pressure.values, _select_windows(pressure, sizes, SMOOTHING.cubic_sigma))
+    values, shortest = pressure.values, _count_samples(pressure.time)
+    smooth = smooth_windows(values, build_valve_windows(pressure.time))
+    apart = np.abs(values - smooth) > SMOOTHING.corner_sigma * pressure.sigma
+    if fill is not None:
+        sizes = [shortest, *_list_longer(pressure.time, shortest)]
+        windows = _select_windows(pressure, sizes, SMOOTHING.cubic_sigma)
+        steady = smooth_windows(values, windows)
+        band = SMOOTHING.fill_sigma * pressure.sigma + 2.0 * fill.std
+        smooth = np.where(np.abs(steady - fill.value) < band, steady, smooth)
+    return np.where(_spread(apart, shortest), values, smooth)
+
+
+def build_valve_windows(time: FloatArray) -> NDArray[np.intp]:
+    """Return the number of samples (n,) of the cubic over `SMOOTHING.window` about each sample, 1
+    where they are too few for it."""
+    size = _count_samples(time)
+    return np.full(time.size, size if size <= time.size else 1, dtype=np.intp)
 
 
 def select_windows(signal: MeasuredSignal) -> NDArray[np.intp]:
@@ -133,17 +133,6 @@ def _compute_noise_gain(size: int) -> float:
     if size <= CUBIC + 1:
         return 1.0
     return float(np.linalg.norm(_compute_cubic_weights(size)[size // 2]))
-
-
-def smooth_local_cubic(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Fit cubics over `SMOOTHING.window` about each sample (n,) (Savitzky and Golay 1964).
-
-    The values as they are where the window holds too few samples for a cubic.
-    """
-    size = _count_samples(time)
-    if size <= CUBIC + 1 or size > values.size:
-        return values
-    return filter_local_cubic(values, size)
 
 
 def compute_bend(time: FloatArray, values: FloatArray) -> FloatArray:

@@ -134,3 +134,37 @@ class ComparedOutputs:
     def measured(self) -> FloatArray:
         """Compared samples, stacked (size,)."""
         return np.concatenate([out.values for out in self.outputs])
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Measured quantity of a quantity x: `gain` · x(t - `delay`) + `offset`."""
+
+    gain: float = 1.0
+    offset: float = 0.0
+    delay: float = 0.0
+
+    def shift(self, time: FloatArray, columns: FloatArray) -> FloatArray:
+        """Interpolate quantities (N, ...) at the instants `time` (N,) [s] less the delay."""
+        if self.delay == 0.0:
+            return columns
+        at = time - self.delay
+        after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
+        share = np.clip((at - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+        share = share.reshape(-1, *[1] * (columns.ndim - 1))
+        return np.asarray((1.0 - share) * columns[after - 1] + share * columns[after])
+
+    def show(self, time: FloatArray, column: FloatArray) -> FloatArray:
+        """Compute the measured quantity (N, ...) of a quantity over `time` (N,) [s]."""
+        return np.asarray(self.gain * self.shift(time, column) + self.offset)
+
+    def find_shown(self, out: Output, time: FloatArray) -> Output:
+        """Return an output with its samples at the points of the grid `time` (N,) [s] that they
+        show: earlier by the delay."""
+        if self.delay == 0.0:
+            return out
+        place, centre = (
+            np.minimum(np.searchsorted(time, time[one] - self.delay), time.size - 1)
+            for one in (out.place, out.centre)
+        )
+        return replace(out, place=place, centre=centre)

@@ -41,10 +41,6 @@ class Quantization:
         """White noise (m,) of the samples with the same power: its mean over a stay is `error`."""
         return np.asarray(self.error * np.sqrt(np.bincount(self.stay)[self.stay]))
 
-    def draw(self, rng: np.random.Generator) -> FloatArray:
-        """Draw random errors (m,)."""
-        return np.asarray(self.error * rng.standard_normal(int(self.stay[-1]) + 1)[self.stay])
-
 
 def estimate_quantization(signal: MeasuredSignal, step: float) -> Quantization | None:
     """Compute the errors that quantization to `step` leaves, in the signal's unit; None if noise

@@ -63,7 +63,7 @@ def _build_column(at: OperatingPoint, role: str, kind: str, size: float) -> Dist
         return None
     if source == TORQUE:
         values = at.engine_torque
-        delay = at.term.structure.get_value(at.point, "te_delay")
+        delay = at.term.plant.get_value(at.point, "te_delay")
         steady = at.record.steady_torque
         rate = at.compute_rate(np.interp(at.run.time + delay, steady.time, steady.values))
     else:
@@ -332,7 +332,7 @@ def _build_shift_columns(
             inputs.setdefault(name, nothing)[:, k] = values / amounts[k]
     keys = tuple(key for key, _ in named)
     stds = {
-        group: priors.get_prior(group.effect, at.term.structure.driveline).std
+        group: priors.get_prior(group.effect, at.term.plant.driveline).std
         for group, _ in keys
         if group.effect is not None
     }
@@ -357,7 +357,7 @@ def _build_curved(
 ) -> Disturbance:
     """Build the only disturbance of a curved effect at an `amount` of its stated size; one without
     action where a shift has none."""
-    std = priors.get_prior(effect, at.term.structure.driveline).std
+    std = priors.get_prior(effect, at.term.plant.driveline).std
     found = EFFECTS[effect].build(at, EFFECTS[effect].scale_amount(amount, std))
     return found[0] if found else Disturbance()
 
@@ -413,7 +413,7 @@ def _build_random(
     at: OperatingPoint, priors: EffectPriors, amounts: Mapping[EffectId, float]
 ) -> Iterator[tuple[Group, Disturbance]]:
     for name, effect in EFFECTS.items():
-        prior = priors.get_prior(name, at.term.structure.driveline)
+        prior = priors.get_prior(name, at.term.plant.driveline)
         if prior.std > 0.0 and not _is_in_plant(at, name):
             size = effect.scale_amount(amounts.get(name, 1.0), prior.std)
             for one in effect.build(at, size):
@@ -424,14 +424,14 @@ def _build_random(
 
 def _is_in_plant(at: OperatingPoint, effect: EffectId) -> bool:
     """Return whether the run itself has an effect, so that a column would count it twice."""
-    own = at.term.structure.plant_effect
+    own = at.term.plant.plant_effect
     return own is not None and own.effect is effect
 
 
 def _build_known(at: OperatingPoint, priors: EffectPriors) -> Iterator[tuple[Disturbance, float]]:
     """Yield the disturbances of effects with a stated value, of that size."""
     for name, effect in EFFECTS.items():
-        value = priors.get_prior(name, at.term.structure.driveline).value
+        value = priors.get_prior(name, at.term.plant.driveline).value
         if value and not _is_in_plant(at, name):
             for one in effect.build(at, abs(value)):
                 yield one, float(np.sign(value))

@@ -148,7 +148,7 @@ def _describe_plant(
     fit: LikelihoodFit, plant: PlantEvidence, columns: int
 ) -> dict[Group, GroupEvidence]:
     """Describe the added element as a group without columns; its amount is its size."""
-    own = fit.problem.terms[0].structure.plant_effect
+    own = fit.problem.terms[0].plant.plant_effect
     assert own is not None, "the plant has an effect"
     first = fit.point.values[plant.index]
     size = own.get_size(float(first))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 
@@ -25,7 +25,7 @@ from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_conta
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.added_elements import AddedElements
 from drivetwin.simulation.driveline import INPUT, OUTPUT, WHEEL
-from drivetwin.simulation.driveline_run import DrivelineTask
+from drivetwin.simulation.driveline_run import COMPARED
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 from drivetwin.vehicle.effects import EffectId
 
@@ -40,14 +40,9 @@ class OperatingPoint:
 
     term: ShiftTerm
     point: ParameterVector
-    task: DrivelineTask
+    model: DualClutch
     run: Trajectory
     response: LinearResponse
-
-    @property
-    def model(self) -> DualClutch:
-        """Dual clutch of the run."""
-        return self.task.model
 
     @property
     def record(self) -> ShiftRecord:
@@ -83,12 +78,12 @@ class OperatingPoint:
     @cached_property
     def load(self) -> float:
         """Magnitude of the load at the output shaft [N m]."""
-        return abs(self.term.structure.compute_load(self.point))
+        return abs(self.term.plant.compute_load(self.point))
 
     @cached_property
     def engine_torque(self) -> FloatArray:
         """Acting engine torque (N-1,) over each step [N m]."""
-        signal = self.term.get_acting_torque(self.point)
+        signal = self.term.plant.place_torque(self.point, self.record.engine_torque)
         return np.interp(self.middle, signal.arrival, signal.values)
 
     @cached_property
@@ -96,14 +91,14 @@ class OperatingPoint:
         """Share (N-1,) of the torque that the on-coming element has taken over, from 0 to 1."""
         offgoing, oncoming = (
             np.abs(compute_middle(self.run.clutch_torque[one.name])) * one.a
-            for one in self.term.structure.elements
+            for one in self.term.plant.elements
         )
         share = oncoming / np.maximum(offgoing + oncoming, 1e-9)
         return np.asarray(np.maximum.accumulate(np.clip(share, 0.0, 1.0)))
 
     def describe_shift(self) -> str:
         """Return the shift in words: its number in the log."""
-        number = int(self.term.structure.label.removeprefix("start")) + 1
+        number = int(self.term.plant.label.removeprefix("start")) + 1
         return f"shift {number}"
 
     def compute_rate(self, column: FloatArray) -> FloatArray:
@@ -117,9 +112,10 @@ class OperatingPoint:
     def compute_change(self, added: AddedElements) -> dict[str, FloatArray]:
         """Compute the changes (N,) of the compared signals by name where elements take the place of
         those beside the dual clutch; NaN where the run fails."""
+        record, plant = self.record, self.term.plant
+        changed = plant.build_task(self.point, record.inputs, record.time, added).simulate()
         before = get_columns(self.run)
-        after = get_columns(replace(self.task, added=added).simulate())
-        return {name: after[name] - before[name] for name in before}
+        return {name: changed.columns[COMPARED[name]] - one for name, one in before.items()}
 
 
 def compute_middle(column: FloatArray) -> FloatArray:
@@ -132,7 +128,7 @@ def evaluate_operating_point(term: ShiftTerm, point: ParameterVector) -> Operati
     run, response = term.simulate(point), term.compute_response(point, NODES)
     if run is None or response is None:
         return None
-    return OperatingPoint(term, point, term.build_task(point), run, response)
+    return OperatingPoint(term, point, term.plant.build_model(point), run, response)
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,7 +75,7 @@ def build_friction_disturbance(element: str, contact: Contact, relative: FloatAr
 def build_friction_shape(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Add each shape to the friction of every element whose law is free."""
     found = []
-    for one in at.term.structure.elements:
+    for one in at.term.plant.elements:
         if not has_free_law(at.point, one.name):
             continue
         contact = at.evaluate_contact(one.name)
@@ -114,7 +114,7 @@ FRICTION_SHAPE = Effect(
 def build_friction_pressure(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Let μ rise with the pressure above P0, less the mean over the slipping phase."""
     found = []
-    for one in at.term.structure.elements:
+    for one in at.term.plant.elements:
         contact = at.evaluate_contact(one.name)
         slips = contact.per_mu != 0.0
         if not has_free_law(at.point, one.name) or not np.any(slips):
@@ -153,7 +153,7 @@ FRICTION_PRESSURE = Effect(
 def build_friction_heat(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Let μ fall with the friction work done, as a share of that of the whole shift."""
     found = []
-    for one in at.term.structure.elements:
+    for one in at.term.plant.elements:
         if not has_free_law(at.point, one.name):
             continue
         contact = at.evaluate_contact(one.name)

@@ -127,7 +127,8 @@ PROGRESSIVE_SHAFT = Effect(
 def build_tyre_slip(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Put a tyre of this slip between the wheel and the vehicle."""
     tyre = TyreSlip.from_slip(at.model.i_f * at.largest_shaft_torque, std, at.model.J_v)
-    return [Disturbance(outputs=at.compute_change(replace(at.task.added, tyre=tyre)))]
+    added = at.term.plant.build_added_elements(at.point, at.model)
+    return [Disturbance(outputs=at.compute_change(replace(added, tyre=tyre)))]
 
 
 def apply_tyre_slip(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:

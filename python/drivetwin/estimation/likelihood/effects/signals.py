@@ -79,7 +79,7 @@ def build_torque_lag(at: OperatingPoint, std: float) -> list[Disturbance]:
         return []
     torque = np.interp(raster, steady.time, steady.values)
     lagged = apply_lag(torque, STEP_S, std) if std > 0.0 else _remove_lag(torque, -std)
-    delay = at.term.structure.get_value(at.point, "te_delay")
+    delay = at.term.plant.get_value(at.point, "te_delay")
     change = np.interp(raster + std, raster, lagged) - torque
     return [Disturbance(inputs={TORQUE: np.interp(at.middle + delay, raster, change)})]
 

@@ -65,7 +65,7 @@ def build_aero_load(at: OperatingPoint, std: float) -> list[Disturbance]:
     if AERO in at.point.names:
         return []
     square = compute_middle(at.run.wheel_speed) ** 2
-    growth = square / max(at.term.structure.mean_speed**2, 1e-9) - 1.0
+    growth = square / max(at.term.plant.mean_speed**2, 1e-9) - 1.0
     torque = std * at.load * at.model.i_f * growth
     return [Disturbance(torques={WHEEL: -torque})]
 
@@ -126,7 +126,7 @@ def build_efficiency_by_gear(at: OperatingPoint, std: float) -> list[Disturbance
 
     The model's η is that of the gear that is left. The share of the on-coming element blends both.
     """
-    driveline = at.term.structure.driveline
+    driveline = at.term.plant.driveline
     torque = at.engine_torque - at.model.J1 * at.compute_rate(at.run.engine_speed)
     change = std * torque * at.oncoming_share / at.model.eta
     subject = f"{driveline.i_before:.4g} to {driveline.i_after:.4g}"
@@ -188,7 +188,7 @@ REFERENCE_TORQUE = 1500.0
 def build_drum_inertia(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Add the torque of an inertia that rotates with the slip of each element without a drum."""
     size = std * at.largest_engine_torque / REFERENCE_TORQUE
-    stated = {one.name for one in at.term.structure.driveline.drums}
+    stated = {one.name for one in at.term.plant.driveline.drums}
     found = []
     for one in at.model.elements:
         if one.name in stated:

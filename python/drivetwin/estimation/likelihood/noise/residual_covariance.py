@@ -25,7 +25,7 @@ passes less than half the sampling rate: a sample's variance times the sampling 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -44,12 +44,14 @@ class LinearResponse:
 
     `transition` (N-1, S, S) takes the disturbance z of S states from one point to the next; `drive`
     (N-1, S) by input name is the effect over a step of that input's disturbance; `rows` (N, S) by
-    output are its derivatives by the states.
+    output are its derivatives by the states. `offset` (N, S) by prescribed speed is the state's
+    derivative by it.
     """
 
     transition: FloatArray
     drive: Mapping[str, FloatArray]
     rows: Mapping[str, FloatArray]
+    offset: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def states(self) -> int:
@@ -113,6 +115,10 @@ class LinearResponse:
         with np.errstate(over="ignore", invalid="ignore"):
             return {name: np.einsum("ns,ns...->n...", row, z) for name, row in self.rows.items()}
 
+    def compute_direct(self, row: FloatArray) -> dict[str, FloatArray]:
+        """Compute the derivatives (N,) of an output of a `row` (N, S) by prescribed speeds."""
+        return {name: np.einsum("ks,ks->k", row, one) for name, one in self.offset.items()}
+
     def add_feedback(self, name: str, slope: FloatArray, row: FloatArray) -> LinearResponse:
         """Let an input follow the quantity of a `row` (N, S) over the states by `slope` (N-1,):
         over each step the mean of both its ends."""
@@ -149,9 +155,10 @@ class SeenOutput:
 
 @dataclass(frozen=True, eq=False)
 class SharedNoise:
-    """Noise of an output in an input that is computed from it: `share` (N-1, n), S."""
+    """Noise of an `output` in an `input` that is computed from it: `share` (N-1, n), S."""
 
     input: str
+    output: str
     share: csr_array
 
 
@@ -308,18 +315,19 @@ def add_input_noise(sigma: FloatArray, response: LinearResponse, noise: InputNoi
 def compute_quiet_noise(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:
     """Compute the change (S,) of each state that an output shows by the noise of its sensor.
 
-    Of several outputs that show a state at once the sensor with the largest noise counts, which
-    leaves most digits to the weighting. A state that none shows at once, as a twist without a
-    torque sensor, shows some time later. One that no output ever shows has no unit to compare with:
-    its change counts as 1.
+    A sensor of the state itself counts, else the output with the least noise that shows it beside
+    others. A state that none shows at once, as a twist without a torque sensor, shows some time
+    later. One that no output ever shows has no unit to compare with: its change counts as 1.
     """
     sizes = np.array([np.median(np.abs(out.row[out.centre]), axis=0) for out in outputs])
-    noise = np.array([[np.min(out.sigma)] for out in outputs])
-    changes = noise / np.where(sizes > 0.0, sizes, np.inf)
-    found = np.asarray(np.max(changes, axis=0), dtype=np.float64)
-    if np.all(found > 0.0):
-        return found
-    return np.where(found > 0.0, found, _probe_states(response, outputs))
+    signals = sizes / np.array([[np.min(out.sigma)] for out in outputs])
+    is_own = np.count_nonzero(sizes, axis=1, keepdims=True) == 1
+    own, mixed = np.max(signals * is_own, axis=0), np.max(signals, axis=0)
+    shown = np.where(own > 0.0, own, mixed)
+    if np.all(shown > 0.0):
+        return np.asarray(1.0 / shown, dtype=np.float64)
+    later = _probe_states(response, outputs)
+    return np.where(shown > 0.0, 1.0 / np.where(shown > 0.0, shown, 1.0), later)
 
 
 def _probe_states(response: LinearResponse, outputs: Sequence[SeenOutput]) -> FloatArray:

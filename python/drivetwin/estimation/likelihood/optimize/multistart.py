@@ -71,7 +71,7 @@ def find_staged_start(
         return None
     plain = replace(
         problem,
-        terms=tuple(ShiftTerm.from_sensor_noise(p.structure, p.record) for p in problem.terms),
+        terms=tuple(ShiftTerm.from_sensor_noise(p.plant, p.record) for p in problem.terms),
     )
     found = minimise(plain, found.point, rough=True)
     return None if found is None or _is_too_far(found) else found
@@ -96,7 +96,7 @@ def _is_too_far(found: OptimizeResult[ShiftObjective]) -> bool:
 def _fix_friction(problem: ShiftObjective, start: ParameterVector) -> ShiftObjective:
     """Fix all parameters of the elements at the start."""
     prior = problem.prior
-    elements = {one.name for term in problem.terms for one in term.structure.elements}
+    elements = {one.name for term in problem.terms for one in term.plant.elements}
     for k, name in enumerate(start.names):
         if name.rpartition(".")[0] in elements:
             prior = prior.fix_parameter(k, start[name])

@@ -72,7 +72,7 @@ class Basis:
 
     def get_prior(self, effect: EffectId) -> EffectPrior:
         """Return the prior of an effect."""
-        return self.priors.get_prior(effect, self.fit.problem.terms[0].structure.driveline)
+        return self.priors.get_prior(effect, self.fit.problem.terms[0].plant.driveline)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +193,7 @@ def _search(basis: Basis) -> Iterator[tuple[EffectId, Refit]]:
 def _propose_plant(effect: EffectId, basis: Basis) -> list[Callable[[], Refit | None]]:
     """Propose an element where its columns have enough evidence, or none of them could show it."""
     fit, prior = basis.fit, basis.get_prior(effect)
-    driveline = fit.problem.terms[0].structure.driveline
+    driveline = fit.problem.terms[0].plant.driveline
     if not (prior.std > 0.0 or prior.value):
         return []
     if not EFFECTS[effect].has_columns:
@@ -219,7 +219,7 @@ def _propose_plant(effect: EffectId, basis: Basis) -> list[Callable[[], Refit | 
 def _compute_load_scale(fit: LikelihoodFit) -> float:
     """Compute the root mean square of the loads of the shifts [N m]: grade changes a load by about
     as much as it is."""
-    loads = [term.structure.compute_load(fit.point) for term in fit.problem.terms]
+    loads = [term.plant.compute_load(fit.point) for term in fit.problem.terms]
     return float(np.sqrt(np.mean(np.square(loads))))
 
 
@@ -233,7 +233,7 @@ GROWING_LOAD = LoadTerm(
 
 def collect_loads(fit: LikelihoodFit) -> tuple[float, ...]:
     """Return the load of each shift at the output shaft [N m] where they differ; else empty."""
-    structures = [term.structure for term in fit.problem.terms]
+    structures = [term.plant for term in fit.problem.terms]
     if not any(one.load_factors for one in structures):
         return ()
     return tuple(one.compute_load(fit.mean) for one in structures)
@@ -252,10 +252,9 @@ def check_other_law(
     Others are those whose intervals under the two laws do not meet. `values` are the parameters by
     id, `slopes` (q, p) their derivatives by the unknowns, `std` (q,) their standard deviations.
     """
-    law = fit.problem.terms[0].structure.loss_law
+    law = fit.problem.terms[0].plant.loss_law
     other = [
-        replace(term, structure=replace(term.structure, loss_law=OTHER[law]))
-        for term in fit.problem.terms
+        replace(term, plant=replace(term.plant, loss_law=OTHER[law])) for term in fit.problem.terms
     ]
     normal = replace(fit.problem, terms=tuple(other)).normal(fit.point)
     if normal is None:

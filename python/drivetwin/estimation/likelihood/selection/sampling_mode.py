@@ -236,7 +236,7 @@ def _start_of_other_outputs(best: LikelihoodFit) -> ParameterVector:
     """Build the initial point for the other sampling mode of the outputs: the minimum of `best`,
     with torque delays by which both modes give nearly the same samples."""
     values = best.point.values.copy()
-    delays = {term.structure.get_unknown("te_delay"): term.record for term in best.problem.terms}
+    delays = {term.plant.get_unknown("te_delay"): term.record for term in best.problem.terms}
     for name, record in delays.items():
         if name in best.point.names:
             speed = next(out for out in record.outputs if out.name in SPEEDS)
@@ -416,7 +416,7 @@ def _changes(term: ShiftTerm, point: ParameterVector) -> FloatArray:
         column = columns[out.name]
         change = out.sample_other_mode(run.time, column) - out.sample(run.time, column)
         found[rows, SIGNALS.index(out.name)] = change
-    bend = record.interpolate_bend(term.structure.get_value(point, "te_delay"))
+    bend = record.interpolate_bend(term.plant.get_value(point, "te_delay"))
     sign = -1.0 if record.curved else 1.0
     answer = term.observe(term.compute_response(point), {TORQUE: sign * bend})
     if np.all(np.isfinite(answer)):  # an unstable run has no finite response

@@ -234,7 +234,7 @@ def _report_growth(best: LikelihoodFit) -> list[Finding]:
         return []
     k = best.point.names.index(AERO)
     std = float(np.sqrt(best.covariance[k, k]))
-    return [report_growth(best.point[AERO], std, best.problem.terms[0].structure.mean_speed)]
+    return [report_growth(best.point[AERO], std, best.problem.terms[0].plant.mean_speed)]
 
 
 def _drop_unknown(best: LikelihoodFit, narrower: ShiftObjective, name: str) -> LikelihoodFit:
@@ -246,7 +246,7 @@ def _drop_unknown(best: LikelihoodFit, narrower: ShiftObjective, name: str) -> L
     k = best.point.names.index(name)
     point, normal = _drop_value(best.point, k), best.normal
     terms = [
-        replace(term, structure=other.structure)
+        replace(term, plant=other.plant)
         for term, other in zip(best.problem.terms, narrower.terms, strict=True)
     ]
     normal = replace(

@@ -47,7 +47,7 @@ def compute_parameters(
 
     `slips` are those [rad/s] at which μ·gain is reported, by element; without it none is.
     """
-    structures = [term.structure for term in problem.terms]
+    structures = [term.plant for term in problem.terms]
     first = structures[0]
     values = {"eta": first.get_value(point, "eta")}
     for structure, s in zip(structures, signals, strict=True):
@@ -89,8 +89,8 @@ def compute_laws(problem: ShiftObjective, point: ParameterVector) -> dict[str, f
     return {
         make_law_id(element.name, key): value
         for term in problem.terms
-        for element in term.structure.elements
-        for key, value in zip(LAW, term.structure.get_law(point, element.name), strict=True)
+        for element in term.plant.elements
+        for key, value in zip(LAW, term.plant.get_law(point, element.name), strict=True)
     }
 
 

@@ -47,7 +47,7 @@ def build_friction_curves(fit: LikelihoodFit, correction: Correction) -> dict[st
         slopes = evaluate_stribeck(_get_law(fit, correction, name)[0], base.slip)[1]
         change, variance = _add_shapes(fit, correction, name, base.slip, slopes)
         found[name] = _set_band(curve, curve.mu + change, np.sqrt(variance))
-    for name, partner in fit.problem.terms[0].structure.partners.items():
+    for name, partner in fit.problem.terms[0].plant.partners.items():
         if partner in found:
             curve = _build_curve(fit, correction, name, found[partner])
             found[name] = replace(
@@ -60,12 +60,12 @@ def build_friction_curves(fit: LikelihoodFit, correction: Correction) -> dict[st
 
 def _list_free_laws(fit: LikelihoodFit) -> list[str]:
     """List the elements whose friction law is free."""
-    every = (one.name for term in fit.problem.terms for one in term.structure.elements)
+    every = (one.name for term in fit.problem.terms for one in term.plant.elements)
     return [name for name in dict.fromkeys(every) if has_free_law(fit.point, name)]
 
 
 def _get_gain(fit: LikelihoodFit, name: str) -> PriorValue:
-    return fit.problem.terms[0].structure.driveline.couplings[name].gain_prior
+    return fit.problem.terms[0].plant.driveline.couplings[name].gain_prior
 
 
 def _get_law(
@@ -74,9 +74,9 @@ def _get_law(
     """Return the coefficients `LAW` (4,) of an element and their derivatives (4, p) by the
     unknowns."""
     structure = next(
-        term.structure
+        term.plant
         for term in fit.problem.terms
-        if name in (one.name for one in term.structure.elements)
+        if name in (one.name for one in term.plant.elements)
     )
     std = np.sqrt(np.diag(fit.covariance))
     rows = differentiate(

@@ -109,7 +109,7 @@ def _compute_friction(
     laws = {
         element.name: element.friction
         for term in fit.problem.terms
-        for element in term.structure.build_model(point).elements
+        for element in term.plant.build_model(point).elements
     }
     return {
         FRICTION + name: float(laws[name].evaluate(np.array([slip]))[0])
