@@ -10,6 +10,7 @@ import pytest
 
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code
+from drivetwin.fit import omissions
 from drivetwin.fit.fit import fit_network, predict
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Recording
@@ -58,6 +59,14 @@ def test_a_delay_that_is_stated_as_exact_is_not_sought() -> None:
     exact = replace(made.model, tolerances={"delay.K0": Tolerance(exact=True)})
     found = fit_network(exact, [read_early(made.recording, "K0")])
     assert "delay.K0" not in list_shown(found)
+
+
+def test_the_number_of_omissions_in_a_model_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(omissions, "OMISSIONS", replace(omissions.OMISSIONS, most=1))
+    made = make_log(ModelName.ENGINE_START)
+    late = read_early(read_early(made.recording, "K0"), "engine torque")
+    found = fit_network(made.model, [late])
+    assert len(list_shown(found)) <= 1
 
 
 def test_drag_that_the_model_lacks_is_found() -> None:

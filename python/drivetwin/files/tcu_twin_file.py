@@ -59,9 +59,11 @@ class TcuTwinFile(Record):
 def is_tcu_twin(path: Path | str) -> bool:
     """Return True if a file is a twin from the log of a gearbox control."""
     try:
+        if not Path(path).is_file():  # a pipe would keep the reader waiting
+            return False
         with Path(path).open(encoding="utf-8", errors="replace") as file:
             return _MARK in file.read(_HEAD)
-    except OSError:
+    except (OSError, ValueError):
         return False
 
 

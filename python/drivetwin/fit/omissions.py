@@ -129,8 +129,8 @@ def complete_model(
     candidates = _list_omissions(found, stated)
     plays = _list_plays(found)
     shown: list[ShownOmission] = []
+    weighed = _weigh_all(found, candidates)
     while len(shown) < OMISSIONS.most:
-        weighed = _weigh_all(found, candidates)
         best = max(weighed, key=lambda one: one.nats, default=None)
         if best is not None and best.weight >= 1.0:
             candidates = [one for one in candidates if one is not best.omission]
@@ -142,6 +142,7 @@ def complete_model(
         if better is not None:
             found = better
             shown.append(ShownOmission(found.problem.terms[0].plant.fixed[-1], nats))
+        weighed = _weigh_all(found, candidates)
     if shown and found.normal.cost > EXPLAINED * found.problem.size:
         # What leaves a residual as it is explains nothing.
         found, shown = stated_model, []

@@ -239,9 +239,8 @@ class Outcome:
     """Result of a command.
 
     `blocks` are for people, `lines` below them are never wrapped; `document` is for programs;
-    `files` were written. `is_confirmed` is false
-    for a result that `--strict` refuses. `fault` is the error of a part, beside which the rest was
-    done. `is_json` is true where the document is the result for people too.
+    `files` were written. `is_confirmed` is false for a result that a strict run refuses. `fault` is
+    the error of a part, beside which the rest was done. `is_json` is true where the document is the result for people too.
     """
 
     blocks: Sequence[Block] = ()

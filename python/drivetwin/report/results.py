@@ -43,18 +43,18 @@ _SCHEMAS: dict[str, tuple[str, type[Record]]] = {
 _NO_TWIN = {
     BusFile: (
         "bus logs have neither pressures nor output torque, so they give no model of a shift",
-        "identify a log with both by a whole vehicle card; '--to csv', ssv, cdfx, dcm and m write "
-        "the values of this result",
+        "identify a log with both by a whole vehicle card; 'drivetwin export RESULT --to csv', or "
+        "ssv, cdfx, dcm, m, writes the values of this result",
     ),
     FitFile: (
         "a fit has the model of its own driveline, model.toml, and no twin of a gear shift",
-        "'drivetwin simulate' runs the fitted model over a log; '--to csv', ssv, cdfx, dcm and m "
-        "write its values",
+        "'drivetwin simulate' runs the fitted model over a log; 'drivetwin export RESULT --to csv'"
+        ", or ssv, cdfx, dcm, m, writes its values",
     ),
     TcuFile: (
         "the twin from the log of a gearbox control has commands as inputs, and a converter",
-        "'drivetwin simulate' predicts shifts with it; '--to csv', ssv, cdfx, dcm and m write its "
-        "values",
+        "'drivetwin simulate' predicts shifts with it; 'drivetwin export RESULT --to csv', or ssv, "
+        "cdfx, dcm, m, writes its values",
     ),
 }
 """Reason and remedy where a result cannot have a twin."""

@@ -123,7 +123,7 @@ def _find_held(shifts: Sequence[ControllerShift], wanted: Collection[int] | None
             raise InputError(
                 f"there is no shift {number}",
                 f"give numbers from 1 to {len(known)}",
-                Where(key="--hold-out"),
+                Where(key="hold_out"),
             )
     return frozenset(wanted)
 
