@@ -198,4 +198,4 @@ def test_a_log_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     known = identify("synthetic")
     arguments = ["--to", "c", "--as-logged", "-o", str(tmp_path / "c")]
     assert main(["export", str(known.twin), *arguments]) == 2
-    assert "--as-logged needs a log" in capsys.readouterr().err
+    assert "--as-logged has no effect without --log" in capsys.readouterr().err

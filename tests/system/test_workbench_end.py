@@ -30,8 +30,9 @@ from tests.system.test_workbench_end import sleep_long
 begin, end = server.start_server, jobs.end_all
 
 def wait_for_job():
-    # A request that waits for a job, as one that opens a log does.
-    threading.Thread(target=jobs.call, args=(sleep_long,), kwargs={"limit": 300.0}).start()
+    # A request that waits for a job, as one that opens a log does: in a daemon of the server.
+    limit = {"limit": 300.0}
+    threading.Thread(target=jobs.call, args=(sleep_long,), kwargs=limit, daemon=True).start()
 
 def start(*given):
     made = begin(*given)

@@ -160,8 +160,6 @@ class Job:
 
 _live: set[Job] = set()
 """Jobs whose process may run."""
-_ending = threading.Event()
-"""Set once the program ends."""
 
 
 def start(work: Work, *arguments: object) -> Job:
@@ -175,8 +173,6 @@ def start(work: Work, *arguments: object) -> Job:
     theirs.close()
     job = Job(process, ours)
     _live.add(job)
-    if _ending.is_set():  # a request that came late; `end_all` may have missed the job
-        process.terminate()
     return job
 
 
@@ -186,8 +182,7 @@ def call(work: Work, *arguments: object, limit: float) -> Any:
 
 
 def end_all() -> None:
-    """End the processes of all jobs, and of all later ones; whoever waits gets an error."""
-    _ending.set()
+    """End the processes of all jobs; whoever waits for one gets its error."""
     processes = [job.process for job in _live.copy()]
     for process in processes:
         process.terminate()
