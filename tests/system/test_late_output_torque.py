@@ -37,6 +37,9 @@ def test_the_fit_starts_from_the_part_of_a_found_delay_that_is_none_of_the_tyre(
     names = [name for name in truth if name in found.estimates]
     assert len(names) >= 12
     for name in names:
-        low, high = found.estimates[name].ci95_total or (0.0, 0.0)
-        assert low <= truth[name]["value"] <= high, name
+        one = found.estimates[name]
+        assert one.value is not None, name
+        assert one.std_total, name
+        # Of twelve intervals of 95 % one in two logs misses the truth.
+        assert abs(one.value - truth[name]["value"]) < 3.0 * one.std_total, name
     assert found.status.value != "not valid"

@@ -31,13 +31,13 @@ def test_locks_and_phases_reach_the_identification(session: Any) -> None:
     shift = session.work.require_shift()
     time = shift.torque_phase[0] - 0.004
     session.move_boundaries(0, {Boundary.TORQUE: time})
-    session.set_lock("k_o", Lock(LockKind.FIXED, 1.6e5))
+    session.set_lock("k_o", Lock(LockKind.FIXED, 1.75e5))
     session.identify([Method.LIKELIHOOD], is_quick=True)
     with pytest.raises(InputError, match="running"):
         session.identify([Method.LIKELIHOOD], is_quick=True)
     finish(session)
     outcome = session.work.require_outcome()
-    assert outcome.twin.parameters["k_o"].value == pytest.approx(1.6e5)
+    assert outcome.twin.parameters["k_o"].value == pytest.approx(1.75e5)
     assert outcome.found is not None
     assert outcome.found.shifts[0].torque_phase[0] == time
 
