@@ -327,7 +327,7 @@ def _write_results(
     from drivetwin._util.regular_file import compute_digest
     from drivetwin._util.version import get_program_version
     from drivetwin.cli.atomic_outputs import write_atomically
-    from drivetwin.export.parameters.files import ParameterFormat, write_parameters
+    from drivetwin.export.parameters.files import ParameterFormat, show_units, write_parameters
     from drivetwin.export.parameters.of_calibration import collect_calibration
     from drivetwin.export.parameters.template import apply_template, read_template, require_labels
     from drivetwin.files.calibration_file import (
@@ -365,7 +365,8 @@ def _write_results(
         for kind in (ParameterFormat.CSV, ParameterFormat.DCM, ParameterFormat.CDFX):
             if template is not None:
                 require_labels(content, template, kind)
-            write_parameters(content, folder / f"calibration.{kind.value}", kind)
+            written = show_units(content, kind) if template is None else content
+            write_parameters(written, folder / f"calibration.{kind.value}", kind)
         page = render_calibration(found, f"Calibration of {name}", shown, front, mapped)
         write_text(folder / REPORT, page)
         if len(sources) > 1:

@@ -240,7 +240,8 @@ class Outcome:
 
     `blocks` are for people, `lines` below them are never wrapped; `document` is for programs;
     `files` were written. `is_confirmed` is false for a result that a strict run refuses. `fault` is
-    the error of a part, beside which the rest was done. `is_json` is true where the document is the result for people too.
+    the error of a part, beside which the rest was done. `is_json` is true where the document is the
+    result for people too.
     """
 
     blocks: Sequence[Block] = ()
