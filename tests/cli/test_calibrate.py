@@ -80,9 +80,7 @@ def test_writes_all_files_with_equal_values(folder: Path) -> None:
     for suffix in ("csv", "dcm", "cdfx"):
         read = read_parameters(folder / f"calibration.{suffix}")
         bar = 1.0 if suffix == "csv" else 1e5
-        values = {
-            one.name: one.value * (bar if one.unit == "bar" else 1.0) for one in read.scalars
-        }
+        values = {one.name: one.value * (bar if one.unit == "bar" else 1.0) for one in read.scalars}
         assert values == pytest.approx({k: one.value for k, one in content.parameters.items()})
         assert len(read.curves) == 3
         assert all(curve.axis.unit == "s" for curve in read.curves)
