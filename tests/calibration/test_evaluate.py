@@ -97,6 +97,19 @@ def test_a_soft_input_shaft_lowers_the_jerk_of_lockup() -> None:
     assert whole[Metric.PEAK_JERK] < 0.8 * reduced[Metric.PEAK_JERK]
 
 
+@pytest.mark.parametrize("slip", [0.002, 0.01, 0.03])
+def test_the_linear_tyre_of_the_search_is_near_the_exact_one(slip: float) -> None:
+    """It has a rim at 3 % alone: at the others that lags by less than two samples."""
+    task = make_task_with({"tyre_slip": slip, "shaft_reference": 2500.0})
+    quick = replace(task, maneuver=task.maneuver.linearise())
+    assert [one["name"] for one in quick.maneuver.elements].count("J_v") == (slip == 0.03)
+    exact, found = (
+        make_plant(one.maneuver).evaluate(start(one), draw(one, 8)).values for one in (task, quick)
+    )
+    for metric, rel in ((Metric.PEAK_JERK, 0.03), (Metric.VIBRATION_DOSE, 0.04)):
+        np.testing.assert_allclose(found[metric], exact[metric], rtol=rel)
+
+
 def test_play_acts_from_the_reversal_of_the_torque_on() -> None:
     (torque, reduced), (whole, other) = compare_with_reduced(ADDED_ELEMENTS["backlash"])
     reversal = int(np.argmax(reduced < 0.0))

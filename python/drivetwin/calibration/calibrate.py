@@ -114,13 +114,21 @@ def set_coarse_step(plant: Plant) -> Plant:
     return replace(plant, maneuver=plant.maneuver.set_step(max(plant.maneuver.step, _COARSE)))
 
 
+def linearise(task: Task, plant: Plant) -> tuple[Task, Plant]:
+    """Return task and plant of the optimiser: tyres are dampers, which run faster."""
+    linear = task.maneuver.linearise()
+    same = linear.set_step(plant.maneuver.step)
+    return replace(task, maneuver=linear), replace(plant, maneuver=same)
+
+
 def find_best(task: Task, plant: Plant) -> FloatArray:
     """Search, polish and keep the limits; return the best coordinates (q,)."""
-    objective = build_objective(task, plant)
+    linear, quick = linearise(task, plant)
+    objective = build_objective(linear, quick)
     with _STAGES.enter("search", "searching"):
-        found = _search(task, plant, objective)
+        found = _search(linear, quick, objective)
     with _STAGES.enter("polish", "polishing"):
-        polished = _polish(task, plant, objective, found)
+        polished = _polish(linear, quick, objective, found)
     with _STAGES.enter("limits", "checking the limits"):
         return _keep_limits(task, plant, objective, polished)
 
@@ -164,6 +172,7 @@ def build_objective(task: Task, plant: Plant) -> Objective:
 def polish_from(task: Task, plant: Plant, start: FloatArray) -> Candidate:
     """Polish coordinates (q,) that come from a neighbouring calibration."""
     settings = task.settings
+    task, plant = linearise(task, plant)
     draws = draw_for(task, settings.neighbour_draws, Purpose.POLISH)
     wider = replace(settings, margin=settings.neighbour_margin)
     objective = build_objective(replace(task, settings=wider), plant)
@@ -204,26 +213,28 @@ def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArr
     """Return coordinates (q,) whose limits hold on the draws of the check, or the nearest to it.
 
     Second slips on these draws are removed first, as far as this is possible. The coordinates
-    are polished from those found, and where this fails from the start.
+    are polished from those found, and where this fails from the start. Limits are measured exactly.
     """
     settings, space = task.settings, Space(task.policy)
-    draws = draw_for(task, settings.check_draws, Purpose.CHECK)
-    tail = draw_for(task, settings.tail_draws, Purpose.TAIL)
+    linear, quick = linearise(task, plant)
+    draws, exact = (draw_for(one, settings.check_draws, Purpose.CHECK) for one in (linear, task))
+    tail = draw_for(linear, settings.tail_draws, Purpose.TAIL)
 
     def assess(at: FloatArray) -> Outcome:
-        return plant.evaluate(space.build_control(at), draws)
+        return quick.evaluate(space.build_control(at), draws)
 
     def exchange(at: FloatArray, joined: NDArray[np.bool_]) -> FloatArray:
         few = tail.select(slice(settings.polish_draws))
-        run = _make_run(task, plant, few.join(draws.select(joined)))
+        run = _make_run(task, quick, few.join(draws.select(joined)))
         return polish(run, at, objective, settings.repair_iterations).coordinates
 
     def measure(at: FloatArray) -> list[float]:
-        certificate = certify(assess(at), task.limits, settings.confidence)
+        outcome = plant.evaluate(space.build_control(at), exact)
+        certificate = certify(outcome, task.limits, settings.confidence)
         return [one.excess for one in certificate.limits]
 
     held = Exchange(assess, exchange, settings.repairs).hold_lockup(found, objective)
-    wider = _make_run(task, plant, tail.join(draws.select(held.joined)))
+    wider = _make_run(task, quick, tail.join(draws.select(held.joined)))
 
     def improve(at: FloatArray, objective: Objective) -> FloatArray:
         return polish(wider, at, objective, settings.repair_iterations).coordinates

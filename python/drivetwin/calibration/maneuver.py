@@ -17,6 +17,7 @@ from drivetwin.simulation.driveline import (
     CRANK,
     ENGINE,
     OUTPUT,
+    VEHICLE,
     Driveline,
     VehicleBody,
     build_driveline,
@@ -145,6 +146,14 @@ class Maneuver:
         wheel = self.point.engine_speed / (self.ratios[0] * model.i_f)
         drive = model.eta * torque * ratio - model.load.evaluate(wheel) / model.i_f
         return drive / sum(model.compute_side_inertias(ratio))
+
+    def linearise(self) -> Maneuver:
+        """Return the shift with a tyre, if any, as a damper about the start."""
+        tyre = self.added.tyre
+        if tyre is None:
+            return self
+        linear = tyre.linearise(self.start.speeds[VEHICLE])
+        return replace(self, added=replace(self.added, tyre=linear))
 
     def set_step(self, step: float) -> Maneuver:
         """Return the shift with another sampling step [s]."""

@@ -172,10 +172,10 @@ def collect_scenarios(maneuver: Maneuver, drivelines: Sequence[Driveline]) -> Sc
     """Collect drivelines as parameter sets; numbers that are equal in all are left out.
 
     The start of each is its own steady acceleration: its shaft twist is a parameter too. Ratios,
-    drums and axes of tables are those of the maneuver.
+    drums, axes of tables and a linear tyre are those of the maneuver.
     """
     base = _describe(maneuver, maneuver.driveline)
-    tables = [_describe(maneuver, one.share_axes(maneuver.added)) for one in drivelines]
+    tables = [_describe(maneuver, one.share_form(maneuver.added)) for one in drivelines]
     sets = {
         path: np.array([table[path] for table in tables])
         for path, value in base.items()

@@ -101,17 +101,42 @@ class OpenConverter:
     engine_inertia: float
 
 
+_FAST_RIM = 2e-3
+"""Lag [s] of a rim behind a linear tyre below which it is left out: the span of the central
+differences by which jerk is computed."""
+
+
 @dataclass(frozen=True)
 class TyreSlip:
-    """Torque at the wheel over slip [N m], and the inertia before the tyre [kg m^2]."""
+    """Torque at the wheel over slip [N m], and the inertia before the tyre [kg m^2], perhaps 0.
+
+    With a `speed` of the vehicle at the wheel [rad/s] the tyre is linear about it: a damper.
+    """
 
     slip_stiffness: float
     rim_inertia: float
+    speed: float | None = None
 
     @classmethod
     def from_slip(cls, torque: float, slip: float, vehicle_inertia: float) -> TyreSlip:
         """Build the tyre that slips by `slip` under `torque` [N m] at the wheel."""
         return cls(torque / slip, RIM_SHARE * vehicle_inertia)
+
+    def linearise(self, speed: float) -> TyreSlip:
+        """Return the damper about a speed of the vehicle at the wheel [rad/s], without a fast rim.
+
+        A run passes it several times as fast as the exact law.
+        """
+        lag = self.rim_inertia * speed / self.slip_stiffness
+        return TyreSlip(self.slip_stiffness, self.rim_inertia * (lag > _FAST_RIM), speed)
+
+    def share_form(self, other: TyreSlip | None) -> TyreSlip:
+        """Return the tyre exact, or linear with or without a rim, as `other` is."""
+        if other is None or other.speed is None:
+            return self
+        return replace(
+            self, rim_inertia=self.rim_inertia * (other.rim_inertia > 0.0), speed=other.speed
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,11 +184,14 @@ class AddedElements:
     tyre: TyreSlip | None = None
     walk: Signal | None = None
 
-    def share_axes(self, other: AddedElements) -> AddedElements:
-        """Return the elements with tables over the axes of those of `other`."""
-        if self.shaft_table is None or other.shaft_table is None:
-            return self
-        return replace(self, shaft_table=self.shaft_table.resample(other.shaft_table.twist))
+    def share_form(self, other: AddedElements) -> AddedElements:
+        """Return the elements as those of `other` are: tables over its axes, linear tyre."""
+        tyre, table = self.tyre, self.shaft_table
+        if tyre is not None:
+            tyre = tyre.share_form(other.tyre)
+        if table is not None and other.shaft_table is not None:
+            table = table.resample(other.shaft_table.twist)
+        return replace(self, tyre=tyre, shaft_table=table)
 
 
 NO_ADDED_ELEMENTS = AddedElements()

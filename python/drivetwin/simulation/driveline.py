@@ -68,9 +68,9 @@ class Driveline:
     model: DualClutch
     added: AddedElements = NO_ADDED_ELEMENTS
 
-    def share_axes(self, other: AddedElements) -> Driveline:
-        """Return the driveline with its tables over the axes of those of `other`."""
-        return Driveline(self.model, self.added.share_axes(other))
+    def share_form(self, other: AddedElements) -> Driveline:
+        """Return the driveline with its added elements in the form of those of `other`."""
+        return Driveline(self.model, self.added.share_form(other))
 
 
 @dataclass(frozen=True)
@@ -200,11 +200,13 @@ def build_shaft(
         shaft = build_element("backlash", SHAFT, **fields, stiffness=side.k_o, gap=added.gap)
     else:
         shaft = build_element("spring_damper", SHAFT, **fields, stiffness=side.k_o)
-    inertia = side.J_v if added.tyre is None else added.tyre.rim_inertia
+    tyre = added.tyre
+    inertia = side.J_v if tyre is None else tyre.rim_inertia
+    massless = tyre is not None and tyre.speed is not None and tyre.rim_inertia == 0.0
     return [
         shaft,
         build_element("gear", "i_f", a=AXLE, b=WHEEL, ratio=side.i_f),
-        build_element("inertia", "J_v", node=WHEEL, inertia=inertia),
+        *([] if massless else [build_element("inertia", "J_v", node=WHEEL, inertia=inertia)]),
         *_build_drag("brake drag", WHEEL, added.brake_drag),
     ]
 
@@ -216,8 +218,11 @@ def build_vehicle(side: OutputSide, added: AddedElements = NO_ADDED_ELEMENTS) ->
     if tyre is not None:
         body, inertia = VEHICLE, side.J_v - tyre.rim_inertia
         fields = {"slip_stiffness": tyre.slip_stiffness, "least_speed": _LEAST_SPEED}
+        if tyre.speed is not None:
+            fields = {"stiffness": 0.0, "damping": tyre.slip_stiffness / tyre.speed}
+        kind = "tyre" if tyre.speed is None else "spring_damper"
         elements = [
-            build_element("tyre", "tyre", a=WHEEL, b=VEHICLE, **fields),
+            build_element(kind, "tyre", a=WHEEL, b=VEHICLE, **fields),
             build_element("inertia", "vehicle", node=VEHICLE, inertia=inertia),
         ]
     elements.append(build_element("road_load", LOAD, node=body, **vars(side.load)))
@@ -296,7 +301,9 @@ def build_start(
         wheel = start.wheel_speed
         braking = added.brake_drag * sign(wheel)
         passed = model.i_f * torque - braking - tyre.rim_inertia * rate
-        speeds[VEHICLE] = wheel / (1.0 + passed / tyre.slip_stiffness * sign(wheel))
+        slip = passed / tyre.slip_stiffness
+        exact = wheel / (1.0 + slip * sign(wheel))
+        speeds[VEHICLE] = exact if tyre.speed is None else wheel - slip * tyre.speed
     return Start(speeds, twists, start.locked)
 
 
