@@ -148,11 +148,12 @@ class Maneuver:
         return drive / sum(model.compute_side_inertias(ratio))
 
     def linearise(self) -> Maneuver:
-        """Return the shift with a tyre, if any, as a damper about the start."""
+        """Return the shift with a tyre, if any, as a damper about the speed of its middle."""
         tyre = self.added.tyre
         if tyre is None:
             return self
-        linear = tyre.linearise(self.start.speeds[VEHICLE])
+        rate = self.compute_acceleration(self.point.engine_torque, self.ratios[0]) / self.model.i_f
+        linear = tyre.linearise(self.start.speeds[VEHICLE] + 0.5 * self.horizon * rate)
         return replace(self, added=replace(self.added, tyre=linear))
 
     def set_step(self, step: float) -> Maneuver:
