@@ -100,7 +100,7 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
     from drivetwin.dyno.scenario_file import load_scenario
     from drivetwin.estimation.result.method import Method
     from drivetwin.workbench.sessions import Sessions
-    from drivetwin.workbench.workspace_folder import Folder
+    from drivetwin.workbench.workspace import Folder
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

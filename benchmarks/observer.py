@@ -21,7 +21,7 @@ import drivetwin
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.observer.observe import estimate_torques
+from drivetwin.observer.smooth import estimate_torques
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
 

@@ -27,7 +27,7 @@ from drivetwin.drive.driver import STEP
 from drivetwin.drive.plan import list_forward_gears
 from drivetwin.drive.result import DriveRun
 from drivetwin.gearbox import Gearbox, load_gearbox
-from drivetwin.gearbox.gears import solve_gear
+from drivetwin.gearbox.maneuver import solve_gear
 from drivetwin.simulation.dual_clutch import FloatArray
 
 _NOISE = {"EngTrq": 2.0, "TrqOut": 5.0, "EngSpd": 1.0, "InpSpd": 1.0, "OutSpd": 0.5, "Pedal": 0.0}

@@ -17,7 +17,7 @@ import numpy as np
 
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.export.c.loaded import CModel, CObserver, Estimates
-from drivetwin.export.subject import Subject, compute_steady_start
+from drivetwin.export.entries import Subject, compute_steady_start
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray, Signal, State, Stribeck
 

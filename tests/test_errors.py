@@ -26,7 +26,7 @@ def test_an_error_passes_between_processes_and_into_sets() -> None:
     assert {error, back} - {error} == {back}
 
 
-SHELL_ONLY = ("cli", "authoring", "workbench", "fleet", "files/stages_file", "logs/mapping_draft")
+SHELL_ONLY = ("cli", "authoring", "workbench", "fleet", "files/limits_file")
 """Parts of the package that only commands use; `fleet.query` names its limits by argument."""
 OPTION = re.compile(r"(?<![\w-])--[a-z]")
 
@@ -56,7 +56,7 @@ def test_errors_and_findings_of_the_python_interface_name_no_options() -> None:
             left.append((name, text))
     # The table of words, keys of options, declarations of options, and notes of `inspect`.
     allowed = {"errors", "vehicle/effects", "logs/survey"}
-    allowed |= {"_util/request", "export/write", "vehicle/card_fields"}
+    allowed |= {"_util/request", "export/write", "vehicle/ratio_card"}
     assert [one for one in left if one[0] not in allowed] == []
 
 

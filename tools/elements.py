@@ -12,8 +12,7 @@ from dataclasses import fields as list_fields
 from pathlib import Path
 from textwrap import fill
 
-from drivetwin.modeling.element_help import FIELD_OF
-from drivetwin.modeling.plates import Plates
+from drivetwin.modeling.element_help import FIELD_OF, Plates
 from drivetwin.simulation.element_schema import ELEMENT_TYPES, ElementType, Field, FieldKind
 from tools.elements_page import fill_page
 
@@ -31,10 +30,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drivetwin.modeling.component import Component
-from drivetwin.modeling.element_help import document_methods
-from drivetwin.modeling.model_components import ModelComponents, Place
-from drivetwin.modeling.plates import Plates
+from drivetwin.modeling.element_help import Plates, document_methods
+from drivetwin.modeling.model_components import Component, ModelComponents, Place
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.network import InputValue
 

@@ -40,8 +40,8 @@ from drivetwin.channels.roles import Quantity, make_command_role
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import ControlledActuator, Program
 from drivetwin.dyno.dyno import DynoRun, apply_effects, run
-from drivetwin.dyno.files import convert_channels
 from drivetwin.dyno.scenario import Scenario, Sensor
+from drivetwin.dyno.scenario_file import convert_channels
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     NominalRun,
     SyntheticVehicle,

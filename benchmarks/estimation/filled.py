@@ -28,7 +28,7 @@ from benchmarks.estimation.validity import judge
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.units import find_unit
-from drivetwin.dyno.files import convert_channels
+from drivetwin.dyno.scenario_file import convert_channels
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.result.estimate import Z95

@@ -14,8 +14,8 @@ from drivetwin.channels.roles import Quantity, get_pressure_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.files import convert_channels
 from drivetwin.dyno.scenario import Scenario, Sensor
+from drivetwin.dyno.scenario_file import convert_channels
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log
 from drivetwin.simulation.dual_clutch import RoadLoad

@@ -18,8 +18,8 @@ from drivetwin.channels.shiftlog import Channel
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import Actuator, Program, Vibration
 from drivetwin.dyno.dyno import DynoRun
-from drivetwin.dyno.files import format_card
 from drivetwin.dyno.scenario import HeldGear, Scenario, Sensor
+from drivetwin.dyno.scenario_file import format_card
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
 
 GEARS = (HeldGear("2", "B2"), HeldGear("3", "B3"))

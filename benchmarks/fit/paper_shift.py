@@ -29,9 +29,8 @@ from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
-from drivetwin.modeling.component import Component
 from drivetwin.modeling.model import Model
-from drivetwin.modeling.model_components import Place
+from drivetwin.modeling.model_components import Component, Place
 from drivetwin.simulation.driveline import ENGINE, OUTPUT, SHAFT, WHEEL, build_driveline
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, DualClutch, Signal, Stribeck
 from drivetwin.simulation.network import Output

@@ -12,9 +12,8 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.fit.fixed_numbers import FixedNumber, list_fixed, make_plain
 from drivetwin.fit.places import Numbers, list_places
-from drivetwin.modeling.component import Component
 from drivetwin.modeling.model import Model
-from drivetwin.modeling.model_components import Place
+from drivetwin.modeling.model_components import Component, Place
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind
 from drivetwin.simulation.network import Output, Start

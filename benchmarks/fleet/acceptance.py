@@ -16,15 +16,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from drivetwin.cli.fleet_view import show_progress
+from drivetwin.cli.fleet import show_progress
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.events import Event, Settled
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet
-from drivetwin.fleet.mixed_model.result import Interval, JointEstimate
+from drivetwin.fleet.mixed_model.mixed import Interval, JointEstimate
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import State
+from drivetwin.fleet.task import Event, Settled, State
 from tests.support.synthetic_fleet import (
     ELEMENT,
     ODOMETER,

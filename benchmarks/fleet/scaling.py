@@ -28,13 +28,12 @@ from time import perf_counter
 from typing import Any
 
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.events import Event, Settled, Started
 from drivetwin.fleet.pool import ONE_THREAD
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import State
+from drivetwin.fleet.task import Event, Settled, Started, State
 
 ROOT = Path(__file__).parents[2]
 LOGS, FIRST = 60, 20

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from drivetwin.fit.unknown import Unknown
     from drivetwin.logs.arrays import read_arrays
     from drivetwin.logs.read import read_log
+    from drivetwin.modeling.element_help import Plates
     from drivetwin.modeling.model import Model
-    from drivetwin.modeling.plates import Plates
     from drivetwin.pipeline import identify
     from drivetwin.report.html import save_report
     from drivetwin.shifts.detect import detect_shifts
@@ -61,7 +61,7 @@ _HOME = {
     "Measured": ("fit.recording", "Measured"),
     "Method": ("estimation.result.method", "Method"),
     "Model": ("modeling.model", "Model"),
-    "Plates": ("modeling.plates", "Plates"),
+    "Plates": ("modeling.element_help", "Plates"),
     "Recording": ("fit.recording", "Recording"),
     "Signal": ("simulation.dual_clutch", "Signal"),
     "Twin": ("twin.twin", "Twin"),

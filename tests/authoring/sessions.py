@@ -10,9 +10,8 @@ from typing import Any
 
 from drivetwin.authoring.card_text import format_card
 from drivetwin.authoring.log_survey import survey_log
-from drivetwin.authoring.options import CardOptions, parse_options
 from drivetwin.authoring.questions import Sources
-from drivetwin.authoring.session import Session
+from drivetwin.authoring.session import CardOptions, Session, parse_options
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.vehicle.card import load_card

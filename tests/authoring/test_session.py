@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.authoring.options import ORDER
+from drivetwin.authoring.session import ORDER
 from drivetwin.errors import CardError, InputError
 from drivetwin.vehicle.spec import PriorValue
 from tests.authoring.sessions import (

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.channels.mapping_text import format_mapping
+from drivetwin.channels.mapping_file import format_mapping, read_mapping
 from drivetwin.channels.read_options import BusOptions, ChannelSpec, ReadOptions, TimeColumn
 from drivetwin.errors import MappingError
 

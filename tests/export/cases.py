@@ -15,11 +15,10 @@ import pytest
 
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import detect_platform
-from drivetwin.export.fixed_step import run_fixed_step
+from drivetwin.export.entries import Subject, compute_steady_start
+from drivetwin.export.fixed_step import InputDelays, run_fixed_step
 from drivetwin.export.fmu.experiment import Experiment
-from drivetwin.export.input_delays import InputDelays
 from drivetwin.export.modelica.model import write_modelica
-from drivetwin.export.subject import Subject, compute_steady_start
 from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import (
     DualClutch,

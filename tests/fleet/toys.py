@@ -16,10 +16,10 @@ from drivetwin import Method
 from drivetwin._util.interrupts import interrupt_on_signals
 from drivetwin.fleet import index, parts, rows, scan, task
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.events import to_document
 from drivetwin.fleet.rules import read_rules
 from drivetwin.fleet.sources import Sources
 from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import to_document
 
 ROOT = Path(__file__).parents[2]
 

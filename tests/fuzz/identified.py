@@ -20,9 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import convert_channels, format_card
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.dyno.scenario_file import convert_channels, format_card, load_scenario
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.mechanism import quick

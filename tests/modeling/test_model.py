@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
+from drivetwin.modeling.element_help import Plates
 from drivetwin.modeling.model import Model
-from drivetwin.modeling.plates import Plates
 from drivetwin.modeling.units import RPM
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS

@@ -28,7 +28,7 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.network import NetworkRun, Output, simulate
-from drivetwin.simulation.network_batch import (
+from drivetwin.simulation.network_response import (
     NetworkScenario,
     differentiate_network_batch,
     simulate_network_batch,

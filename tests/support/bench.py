@@ -15,8 +15,8 @@ from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.effects import Effects
 from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.truth import Effects
 from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
@@ -26,7 +26,7 @@ from drivetwin.estimation.data.shift_data import (
 from drivetwin.estimation.identification import Identification
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.effects import EffectId, EffectPrior
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.ratio_card import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

@@ -15,9 +15,8 @@ import numpy as np
 
 from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.scenario import Scenario
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.dyno.scenario_file import format_card, format_log, load_scenario
 from drivetwin.simulation.dual_clutch import Stribeck
 
 UNITS = 60

@@ -16,10 +16,10 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.cli.output import print_blocks, print_json
 from drivetwin.export.c.write import write_c
+from drivetwin.export.entries import Subject
 from drivetwin.export.modelica.model import write_modelica
 from drivetwin.export.parameters.content import ParameterSet, Scalar
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters, write_parameters
-from drivetwin.export.subject import Subject
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from drivetwin.logs.write import write_log

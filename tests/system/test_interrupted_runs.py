@@ -18,7 +18,7 @@ from drivetwin.errors import SimulationError
 from drivetwin.simulation.batch import Keep
 from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import Sine, Start, simulate
-from drivetwin.simulation.network_batch import to_core_scenarios
+from drivetwin.simulation.network_response import to_core_scenarios
 from drivetwin.simulation.network_sensitivity import differentiate
 from drivetwin.simulation.serialize import as_json
 from tests.simulation.test_batch import (

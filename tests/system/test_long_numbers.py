@@ -21,7 +21,7 @@ from drivetwin.simulation.dual_clutch import (
 )
 from drivetwin.simulation.linearize import linearise
 from drivetwin.simulation.network import Sine, Start, simulate
-from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
+from drivetwin.simulation.network_response import NetworkScenario, simulate_network_batch
 from tests.export.cases import paper_model
 
 LONG: list[Any] = [-(10**400), 10**5000, np.inf]

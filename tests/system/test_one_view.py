@@ -15,10 +15,10 @@ from drivetwin.drive import load_powertrain, plan_launch, run
 from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.gearbox import load_gearbox
-from drivetwin.report.brief import build_identification_blocks
 from drivetwin.report.drive import build_energy_table, build_shift_table, render_drive
 from drivetwin.report.fit import build_fit_blocks, render_fit
 from drivetwin.report.html import render_fragment, render_joint_report, render_report
+from drivetwin.report.notebook import build_identification_blocks
 from drivetwin.report.text import format_blocks
 from drivetwin.validation.simulate_log import attach_fit
 from drivetwin.workbench.views.blocks import render_block

@@ -18,7 +18,7 @@ from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import build_server
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views.page import Start
-from drivetwin.workbench.workspace_folder import Folder
+from drivetwin.workbench.workspace import Folder
 
 LOG, CARD = "bench.csv", "bench.card.toml"
 

@@ -16,7 +16,7 @@ import pytest
 from drivetwin import Method
 from drivetwin.errors import RefusedError
 from drivetwin.vehicle.locks import Lock, LockKind
-from drivetwin.workbench.phases import Boundary
+from drivetwin.workbench.identifying import Boundary
 from tests.workbench.conftest import CARD, LOG
 
 

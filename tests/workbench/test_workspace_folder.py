@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.errors import RefusedError
-from drivetwin.workbench.workspace_folder import Folder
+from drivetwin.workbench.workspace import Folder
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! Many runs of a driveline; see `drivetwin.simulation.network_batch`.
+//! Driveline runs; see `drivetwin.simulation.network_response`.
 
 use crate::border::{call, refused};
 use crate::output::{NamedOutput, outputs_of};

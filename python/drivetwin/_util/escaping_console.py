@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from drivetwin._util.visible_text import escape_text
+from drivetwin._util.text import escape_text
 
 
 class EscapingConsole(Console):

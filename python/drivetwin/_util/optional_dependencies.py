@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Optional libraries that read foreign formats: found, or named with their install command."""
+"""Version of the program, and the optional libraries that read foreign formats."""
 
 from __future__ import annotations
 
@@ -8,12 +8,23 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from importlib import import_module
+from functools import cache
+from importlib import import_module, metadata
 from pathlib import Path
 from threading import RLock, get_ident
 from typing import Any, TextIO, cast
 
 from drivetwin.errors import DrivetwinError, FileFormatError, MissingExtraError, Where
+
+
+@cache
+def get_program_version() -> str:
+    """Version of the installed distribution; `unknown` when run from a source tree."""
+    try:
+        return metadata.version("drivetwin")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
 
 _one_at_a_time = RLock()
 """Held while a foreign library is loaded or parses: standard output, hook and warnings are those

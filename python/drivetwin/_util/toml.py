@@ -14,7 +14,7 @@ from typing import Any, cast
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, TypeAdapter, ValidationError
 from pydantic_core import CoreSchema
 
-from drivetwin._util.regular_file import measure_regular_file
+from drivetwin._util.atomic import measure_regular_file
 from drivetwin.errors import InputError, Where, suggest_spelling
 
 MAX_SIZE = 4_000_000

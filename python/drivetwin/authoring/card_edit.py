@@ -9,8 +9,7 @@ from copy import deepcopy
 from typing import Any
 
 from drivetwin._util.toml import parse_toml
-from drivetwin.authoring.parsing import parse_range
-from drivetwin.authoring.stated_number import parse_stated
+from drivetwin.authoring.stated_number import parse_range, parse_stated
 from drivetwin.errors import InputError, Where
 
 Path = tuple[str | int, ...]

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
+from drivetwin._util.text import escape_line
 from drivetwin._util.toml import (
     format_entry,
     format_key,
@@ -15,8 +16,10 @@ from drivetwin._util.toml import (
     parse_toml,
     raise_faults,
 )
-from drivetwin._util.visible_text import escape_line
-from drivetwin.authoring.answers import (
+from drivetwin.authoring.element_questions import KEY, describe_product, find_form, format_converter
+from drivetwin.authoring.log_estimates import LogEstimates
+from drivetwin.authoring.log_survey import LogSurvey
+from drivetwin.authoring.question import (
     UNKNOWN,
     Answer,
     Answers,
@@ -26,14 +29,11 @@ from drivetwin.authoring.answers import (
     list_elements,
     list_gears,
 )
-from drivetwin.authoring.element_questions import KEY, describe_product, find_form, format_converter
-from drivetwin.authoring.log_estimates import LogEstimates
-from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
 from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import check_card
-from drivetwin.vehicle.card_fields import get_card_field
+from drivetwin.vehicle.ratio_card import get_card_field
 
 
 def format_card(

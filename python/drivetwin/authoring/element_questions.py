@@ -10,25 +10,33 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from drivetwin.authoring.answers import (
+from drivetwin.authoring.derive import GEOMETRY
+from drivetwin.authoring.log_estimates import ASSUMED_FRICTION, USUAL_FILL, LogEstimates
+from drivetwin.authoring.log_survey import LogSurvey
+from drivetwin.authoring.question import (
     Answer,
     Answers,
     GainForm,
     Key,
     Origin,
+    Question,
     get_value,
     list_gears,
+    make_parser,
+    make_question,
 )
-from drivetwin.authoring.derive import GEOMETRY
-from drivetwin.authoring.log_estimates import ASSUMED_FRICTION, USUAL_FILL, LogEstimates
-from drivetwin.authoring.log_survey import LogSurvey
-from drivetwin.authoring.parsing import Parser, parse_choice, parse_number, split_list
-from drivetwin.authoring.question import Question, make_parser, make_question
-from drivetwin.authoring.stated_number import StatedNumber, parse_clutch_ratio
+from drivetwin.authoring.stated_number import (
+    Parser,
+    StatedNumber,
+    parse_choice,
+    parse_clutch_ratio,
+    parse_number,
+    split_list,
+)
 from drivetwin.channels.units import BAR
 from drivetwin.vehicle.card import RATIO_TOLERANCE
-from drivetwin.vehicle.card_fields import get_card_field
-from drivetwin.vehicle.converter import ConverterTable
+from drivetwin.vehicle.ratio_card import get_card_field
+from drivetwin.vehicle.spec import ConverterTable
 
 KEY: Key = ("converter",)
 _ENTRIES = ("speed_ratio", "torque_ratio", "pump_torque_at_1000rpm_Nm")

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivetwin.authoring.answers import Answers, get_value, list_gears
 from drivetwin.authoring.log_survey import LogSurvey
+from drivetwin.authoring.question import Answers, get_value, list_gears
 from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.channels.roles import get_pressure_element, make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
@@ -25,8 +25,7 @@ from drivetwin.plausibility.friction import (
 from drivetwin.shifts.breakaway_lockup import locate_torque_dip, smooth_channel
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.card_fields import get_card_field
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.ratio_card import ShiftKind, get_card_field
 from drivetwin.vehicle.spec import (
     ElementKind,
     ElementSpec,

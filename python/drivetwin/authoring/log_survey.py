@@ -26,10 +26,9 @@ from drivetwin.logs.quality.time_alignment import estimate_final_drive, estimate
 from drivetwin.logs.raw import Remembered
 from drivetwin.logs.read import Demands, read_recording
 from drivetwin.plausibility.entries import PLAUSIBILITY
-from drivetwin.shifts.held_ratios import find_held_ratios
-from drivetwin.shifts.kinematics import GearboxSpeeds, resample_geared
+from drivetwin.shifts.kinematics import GearboxSpeeds, find_held_ratios, resample_geared
 from drivetwin.shifts.shift import ShiftSettings
-from drivetwin.vehicle.card_fields import get_card_field
+from drivetwin.vehicle.ratio_card import get_card_field
 from drivetwin.vehicle.spec import ElementSpec, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

@@ -7,26 +7,33 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from drivetwin.authoring.answers import UNKNOWN, Answer, Answers, Key, Origin, get_value
-from drivetwin.authoring.element_questions import KEY, iterate_element_questions, parse_converter
-from drivetwin.authoring.gearboxes import (
+from drivetwin.authoring.derive import (
     GearboxFit,
     list_forward_gears,
     match_gearboxes,
     reduce_gears,
     refuse_irreducible,
 )
+from drivetwin.authoring.element_questions import KEY, iterate_element_questions, parse_converter
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
-from drivetwin.authoring.parsing import parse_choice, parse_names, parse_range
-from drivetwin.authoring.question import Question, make_question
+from drivetwin.authoring.question import (
+    UNKNOWN,
+    Answer,
+    Answers,
+    Key,
+    Origin,
+    Question,
+    get_value,
+    make_question,
+)
 from drivetwin.authoring.sensor_classes import (
     get_offset_unit,
     list_classes,
     parse_sensor,
     read_sensor_classes,
 )
-from drivetwin.authoring.stated_number import StatedNumber
+from drivetwin.authoring.stated_number import StatedNumber, parse_choice, parse_names, parse_range
 from drivetwin.channels.roles import get_pressure_element
 from drivetwin.errors import CardError
 from drivetwin.gearbox import list_builtin_gearboxes

@@ -48,8 +48,8 @@ from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain, report
-from drivetwin.shifts.causes import report_unknown_ratios
-from drivetwin.shifts.held_ratios import (
+from drivetwin.shifts.coverage import report_unknown_ratios
+from drivetwin.shifts.kinematics import (
     RESTS,
     HeldRatio,
     find_held_ratios,

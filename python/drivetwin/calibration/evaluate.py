@@ -22,7 +22,7 @@ from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import BatchRequest, Keep
 from drivetwin.simulation.network import Output, to_native
-from drivetwin.simulation.network_batch import NetworkScenario, to_core_scenarios
+from drivetwin.simulation.network_response import NetworkScenario, to_core_scenarios
 from drivetwin.simulation.serialize import as_json
 from drivetwin.simulation.shift_control import simulate_network_controlled
 

@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 from drivetwin._util.child_process import describe_end
 from drivetwin._util.progress import attach_listener, notify_progress
 from drivetwin.errors import ControllerError, Where
-from drivetwin.simulation.controller_library import Call, create_trace, read_calls
+from drivetwin.simulation.driveline_run import Call, create_trace, read_calls
 
 LONGEST_CALL = 5.0
 """Time [s] after which a call counts as an endless loop: ten thousand times that of a real task."""

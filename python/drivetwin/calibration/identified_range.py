@@ -13,7 +13,7 @@ from drivetwin.findings import Finding
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.identified_range import CARRIES, check_range
+from drivetwin.validation.initial_state import CARRIES, check_range
 
 
 def check_identified_range(

@@ -31,7 +31,7 @@ from drivetwin.calibration.twin_task import Request, build_task, choose_point
 from drivetwin.calibration.units import MakeActuators
 from drivetwin.errors import ControllerError
 from drivetwin.estimation.identification import OIL_TEMPERATURE
-from drivetwin.simulation.controller_library import INPUTS as SIGNALS
+from drivetwin.simulation.driveline_run import INPUTS as SIGNALS
 from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.simulation.shift_control import INPUTS, ControlledUnit
 from drivetwin.twin.twin import Twin

@@ -19,11 +19,12 @@ from drivetwin.estimation.result.verdict import assess
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import PROGRESSION, TYRE_SLIP
-from drivetwin.twin.distribution import collect_covariance, has_possible_elements
-from drivetwin.twin.friction_law import (
+from drivetwin.twin.distribution import (
     build_partner_spread,
+    collect_covariance,
     compute_friction_std,
     compute_law_covariance,
+    has_possible_elements,
     to_law,
     to_values,
 )

@@ -19,12 +19,11 @@ from drivetwin.cli.examine import examine
 from drivetwin.cli.export import export
 from drivetwin.cli.fit import fit
 from drivetwin.cli.fleet import fleet
-from drivetwin.cli.gearbox import gearbox
+from drivetwin.cli.gearbox import gearbox, reduce
 from drivetwin.cli.identify import identify
 from drivetwin.cli.inspect import inspect
 from drivetwin.cli.observe import observe
 from drivetwin.cli.output import show_error
-from drivetwin.cli.reduce import reduce
 from drivetwin.cli.report import report
 from drivetwin.cli.schema import schema
 from drivetwin.cli.shifts import shifts
@@ -75,7 +74,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from drivetwin._util.version import get_program_version
+        from drivetwin._util.optional_dependencies import get_program_version
 
         typer.echo(f"drivetwin {get_program_version()}")
         raise typer.Exit

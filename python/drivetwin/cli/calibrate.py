@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from drivetwin.calibration.operating_map import Grid, OperatingMap
     from drivetwin.calibration.policies.own import UserController
     from drivetwin.calibration.twin_task import Request
-    from drivetwin.files.stages_file import StagesFile
+    from drivetwin.files.limits_file import StagesFile
     from drivetwin.findings import Finding
     from drivetwin.report.blocks import Block
     from drivetwin.twin.twin import Twin
@@ -190,9 +190,9 @@ def _build_request(
 
 def _open_stages(request: Calibrate) -> StagesFile:
     """Open the store of finished stages beside the output folder."""
-    from drivetwin._util.regular_file import compute_digest
-    from drivetwin._util.version import get_program_version
-    from drivetwin.files.stages_file import StagesFile, resume_stages
+    from drivetwin._util.atomic import compute_digest
+    from drivetwin._util.optional_dependencies import get_program_version
+    from drivetwin.files.limits_file import StagesFile, resume_stages
 
     contents = {
         f"{name} file": "" if path is None else compute_digest(path)
@@ -322,13 +322,12 @@ def _write_results(
     shown: tuple[tuple[Finding, ...], list[Block]],
     origin: tuple[Twin, Request],
 ) -> None:
-    from drivetwin._util.atomic import write_text
+    from drivetwin._util.atomic import compute_digest, write_text
+    from drivetwin._util.optional_dependencies import get_program_version
     from drivetwin._util.plain_values import format_json
-    from drivetwin._util.regular_file import compute_digest
-    from drivetwin._util.version import get_program_version
-    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.cli.output import write_atomically
     from drivetwin.export.parameters.files import ParameterFormat, show_units, write_parameters
-    from drivetwin.export.parameters.of_calibration import collect_calibration
+    from drivetwin.export.parameters.of_twin import collect_calibration
     from drivetwin.export.parameters.template import apply_template, read_template, require_labels
     from drivetwin.files.calibration_file import (
         Provenance,

@@ -18,7 +18,7 @@ from drivetwin.cli.output import (
 )
 from drivetwin.errors import DrivetwinError, InputError, Where
 from drivetwin.report.blocks import build_findings_section
-from drivetwin.vehicle.card_fields import list_single_options
+from drivetwin.vehicle.ratio_card import list_single_options
 
 if TYPE_CHECKING:
     from drivetwin.authoring.log_survey import LogSurvey
@@ -87,9 +87,8 @@ def new(request: NewCard, *, as_json: bool) -> None:
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.authoring.card_text import format_card, refuse_faults
-    from drivetwin.authoring.options import CardOptions, parse_options
     from drivetwin.authoring.questions import Sources
-    from drivetwin.authoring.session import Session
+    from drivetwin.authoring.session import CardOptions, Session, parse_options
     from drivetwin.files.records import dump_findings
 
     output, from_log = request.output, request.from_log
@@ -146,7 +145,7 @@ def _survey(log: Path, channels: Path | None) -> LogSurvey:
 
 def _make_default_name(output: Path) -> str:
     """Name a vehicle after the file of its card."""
-    from drivetwin.authoring.parsing import parse_name
+    from drivetwin.authoring.stated_number import parse_name
 
     try:
         return parse_name(output.name.removesuffix(".toml").removesuffix(".card"))
@@ -161,7 +160,7 @@ def has_terminal() -> bool:
 
 def _ask(question: Question, reason: str) -> str:
     """Ask a question in the terminal, with the reason why the answer before was refused."""
-    from drivetwin._util.visible_text import escape_line
+    from drivetwin._util.text import escape_line
 
     if reason:
         print_line(f"  not taken: {reason}")

@@ -14,7 +14,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from drivetwin._util.visible_text import escape_line
+from drivetwin._util.text import escape_line
 from drivetwin.cli.examples import format_end
 from drivetwin.cli.options import bind_command, get_request
 

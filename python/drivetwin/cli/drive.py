@@ -75,7 +75,7 @@ def drive(request: Drive) -> Outcome:
 
 def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
     """Write figure and traces, both or none."""
-    from drivetwin.cli.atomic_outputs import write_texts
+    from drivetwin.cli.output import write_texts
     from drivetwin.report.drive import format_traces, render_drive
 
     texts = {FIGURE: render_drive(motion, title), TRACES: format_traces(motion)}

@@ -138,7 +138,7 @@ def _identify_friction(outcome: IdentifiedLog, shape: FrictionShape) -> Answer:
 
 def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
     """Write the answers, all or none."""
-    from drivetwin.cli.atomic_outputs import write_texts
+    from drivetwin.cli.output import write_texts
 
     return write_texts(folder, {one.file: one.text for one in answers})
 

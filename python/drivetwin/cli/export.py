@@ -126,12 +126,12 @@ def _describe_model(made: ExportedModel, request: Export, path: Path) -> Outcome
 
 def _load_model(twin: Twin, request: Export) -> ExportedModel:
     """Load the model, and the initial state from the shift of the log if one is given."""
-    from drivetwin.export.subject import build_subject
+    from drivetwin.export.entries import build_subject
 
     gears = None if request.shift is None else parse_gears(request.shift)
     if request.log is None:
         return ExportedModel(build_subject(twin, gears), None)
-    from drivetwin.export.fmu.measured import build_measured_subject
+    from drivetwin.export.fmu.experiment import build_measured_subject
 
     recording, _ = read_twin_log(twin, request.log, channels=request.channels)
     found = build_measured_subject(twin, recording, gears, as_logged=request.as_logged)

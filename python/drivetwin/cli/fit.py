@@ -48,7 +48,7 @@ def fit(request: Fit) -> Outcome:
 
 def fit_logs(request: Fit) -> tuple[ModelFit, Outcome]:
     """Read the recordings, fit the model, predict what is held out, and write the result."""
-    from drivetwin.cli.atomic_outputs import write_texts
+    from drivetwin.cli.output import write_texts
     from drivetwin.files.fit_file import build_fit_file
     from drivetwin.fit.fit import fit_network, predict
     from drivetwin.fit.model_file import format_model, read_model

@@ -23,9 +23,14 @@ from drivetwin.cli.arguments import (
     quick_option,
     strict_flag,
 )
-from drivetwin.cli.atomic_outputs import refuse_same_names, write_atomically, write_texts
 from drivetwin.cli.identify_run import IdentifyOptions, build_outcome, effects_option, read_shifts
-from drivetwin.cli.output import show_findings, show_step
+from drivetwin.cli.output import (
+    refuse_same_names,
+    show_findings,
+    show_step,
+    write_atomically,
+    write_texts,
+)
 from drivetwin.errors import DrivetwinError, InputError, Where
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method

@@ -19,8 +19,7 @@ from drivetwin.cli.arguments import (
     method_option,
     quick_option,
 )
-from drivetwin.cli.atomic_outputs import write_atomically
-from drivetwin.cli.output import show_findings, show_step
+from drivetwin.cli.output import show_findings, show_step, write_atomically
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
 from drivetwin.report.blocks import Outcome
@@ -125,7 +124,7 @@ def identify_log(log: Path, how: IdentifyOptions, folder: Path | None) -> Outcom
 def build_outcome(found: Identification, files: Sequence[Path]) -> Outcome:
     """Build the outcome of an identification with the files that were written."""
     from drivetwin.files.result_file import ResultFile
-    from drivetwin.report.brief import build_identification_blocks
+    from drivetwin.report.notebook import build_identification_blocks
 
     document = ResultFile.from_result(found).to_document()
     return Outcome(build_identification_blocks(found), document, files, found.status.is_confirmed)

@@ -34,7 +34,7 @@ def identify_controller_logs(request: Identify) -> Outcome:
 
     Raises InputError for options of other logs, and the typed errors of reader and fit.
     """
-    from drivetwin.files.tcu_file import build_tcu_file
+    from drivetwin.files.tcu_twin_file import build_tcu_file
     from drivetwin.report.tcu import build_tcu_blocks
     from drivetwin.tcu.card import load_controller_card
     from drivetwin.tcu.outcome import identify_controller
@@ -76,7 +76,7 @@ def _read_numbers(wanted: Sequence[str]) -> list[int] | None:
 
 def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; return their paths."""
-    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.cli.output import write_atomically
     from drivetwin.files.tcu_twin_file import save_tcu_twin
     from drivetwin.report.tcu import render_tcu
 
@@ -105,8 +105,7 @@ def simulate_controller(twin: Path, request: Simulate) -> Outcome:
     """
     from drivetwin._util.atomic import write_text
     from drivetwin._util.outputs import PAGE, select_outputs
-    from drivetwin.files.tcu_file import record_prediction
-    from drivetwin.files.tcu_twin_file import load_tcu_twin
+    from drivetwin.files.tcu_twin_file import load_tcu_twin, record_prediction
     from drivetwin.report.blocks import Tone, make_notes
     from drivetwin.report.tcu import build_prediction_table, render_predictions
     from drivetwin.tcu.log import read_controller_log

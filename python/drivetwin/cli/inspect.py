@@ -20,7 +20,7 @@ from drivetwin.report.sections.inputs import build_column_table
 
 if TYPE_CHECKING:
     from drivetwin.channels.mapping import Mapped
-    from drivetwin.channels.mapping_text import Draft
+    from drivetwin.channels.mapping_file import Draft
     from drivetwin.logs.raw import Recording
     from drivetwin.logs.survey import Column, Survey
     from drivetwin.vehicle.card import VehicleCard
@@ -48,11 +48,10 @@ def inspect(request: Inspect) -> Outcome:
     Also list the warnings of shifts and identify, and their reason if they refuse the log.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.channels.mapping_file import read_mapping
-    from drivetwin.channels.mapping_text import format_mapping
+    from drivetwin.channels.mapping_file import format_mapping, read_mapping
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.formats.can.database import list_databases
-    from drivetwin.logs.mapping_draft import draft_mapping
+    from drivetwin.logs.survey import draft_mapping
     from drivetwin.vehicle.card import load_card
     from drivetwin.vehicle.ratio_card import is_ratio_card
 
@@ -197,8 +196,8 @@ def _write_unread(
 ) -> None:
     """Write a mapping with what is stated and stubs of all roles, for a log that cannot be read."""
     from drivetwin._util.atomic import write_text
-    from drivetwin.channels.mapping_text import format_mapping
-    from drivetwin.logs.mapping_draft import draft_unread
+    from drivetwin.channels.mapping_file import format_mapping
+    from drivetwin.logs.survey import draft_unread
 
     elements = None if card is None else tuple(card.elements)
     draft = draft_unread(elements, stated.channels, fault.what, databases)

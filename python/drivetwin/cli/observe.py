@@ -40,7 +40,7 @@ def observe(request: Observe) -> Outcome:
     """
     from drivetwin._util.atomic import write_text
     from drivetwin.files.twin_file import load_twin
-    from drivetwin.observer.observe import estimate_torques
+    from drivetwin.observer.smooth import estimate_torques
     from drivetwin.report.observer import build_torque_blocks, render_observations
     from drivetwin.shifts.detect import require_shifts
 
@@ -82,7 +82,7 @@ def _observe_shifts(
 
 
 def _write_observations(path: Path, found: Sequence[Observation]) -> None:
-    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.cli.output import write_atomically
     from drivetwin.export.parameters.spelling import to_flat_name
     from drivetwin.logs.write import write_log
 

@@ -55,7 +55,7 @@ def shifts(request: DetectShifts) -> Outcome:
     from drivetwin.report.blocks import build_findings_section
     from drivetwin.report.sections.summary import build_phase_table
     from drivetwin.report.whole_drive import build_comparison_table
-    from drivetwin.shifts.causes import find_causes
+    from drivetwin.shifts.coverage import find_causes
     from drivetwin.shifts.detect import find_gear_spans
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
     from drivetwin.shifts.shift import make_shift_labels

@@ -73,9 +73,9 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
     from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
     from drivetwin.files.records import dump_findings
     from drivetwin.report.blocks import build_findings_section
-    from drivetwin.report.sections.fits import build_fit_table
+    from drivetwin.report.sections.summary import build_fit_table
     from drivetwin.shifts.detect import require_shifts
-    from drivetwin.validation.command_pressures import replace_pressures
+    from drivetwin.validation.initial_state import replace_pressures
     from drivetwin.validation.simulate_log import format_signals, simulate_shift
 
     model, log = made.load_twin(), request.log

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from drivetwin._util.outputs import LOG_ENDINGS
 from drivetwin._util.request import Request, option, output_file
-from drivetwin.cli.atomic_outputs import write_atomically, write_texts
-from drivetwin.cli.output import show_step
+from drivetwin.cli.output import show_step, write_atomically, write_texts
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.report.blocks import Outcome
 from drivetwin.vehicle.effects import EffectId
@@ -82,8 +81,8 @@ def synth(request: Synthesize) -> Outcome:
 def _write_scenario_log(request: Synthesize) -> dict[str, Path]:
     """Write log, card and truth of a scenario, all or none; return their paths."""
     from drivetwin.dyno.dyno import run
-    from drivetwin.dyno.effects import parse_effects
     from drivetwin.dyno.scenario_file import load_scenario
+    from drivetwin.dyno.truth import parse_effects
 
     setup = load_scenario(request.scenario, request.drum)
     setup = setup.set_torque_reduction(request.torque_reduction)
@@ -139,7 +138,7 @@ def write_run(output: Path, run: DynoRun) -> tuple[Path, Path, Path]:
     A CSV log is one table in which slow channels hold their value, as a data logger writes it; the
     other formats keep each channel's own time base.
     """
-    from drivetwin.dyno.files import convert_channels, format_card, format_log, format_truth
+    from drivetwin.dyno.scenario_file import convert_channels, format_card, format_log, format_truth
     from drivetwin.logs.write import write_log
 
     card, truth = output.with_suffix(".card.toml"), output.with_suffix(".truth.json")

@@ -19,7 +19,7 @@ from drivetwin.cli.own_controller import compile_controller
 if TYPE_CHECKING:
     from drivetwin.calibration.trial import Trial
     from drivetwin.calibration.trial_comparison import Difference
-    from drivetwin.files.trial_file import TrialFile
+    from drivetwin.files.limits_file import TrialFile
     from drivetwin.twin.twin import Twin
 
 JUNIT = "junit.xml"
@@ -54,7 +54,7 @@ def try_controller(request: Try, *, as_json: bool) -> None:
     """
     from drivetwin.calibration.trial_comparison import compare_trials
     from drivetwin.cli.calibrate import load_valid_twin
-    from drivetwin.files.trial_file import STOCK, load_trials
+    from drivetwin.files.limits_file import STOCK, load_trials
     from drivetwin.report.trial import build_trial_blocks
 
     twin, trials = load_valid_twin(request.twin), load_trials(request.scenarios or STOCK)
@@ -102,7 +102,7 @@ def _write_results(
     folder: Path, found: list[Trial], differences: list[Difference], path: Path
 ) -> None:
     from drivetwin._util.atomic import write_text
-    from drivetwin.cli.atomic_outputs import write_atomically
+    from drivetwin.cli.output import write_atomically
     from drivetwin.report.trial import format_junit, render_trials
 
     with write_atomically(folder) as beside:

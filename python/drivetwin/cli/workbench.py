@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from drivetwin.workbench.access_control import Access
     from drivetwin.workbench.views.page import Start
-    from drivetwin.workbench.workspace_folder import Folder
+    from drivetwin.workbench.workspace import Folder
 
 _LINK_PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>drivetwin</title>
 <meta http-equiv="refresh" content="0; url={0}"></head><body><a href="{0}">{0}</a></body></html>
@@ -46,9 +46,9 @@ def workbench(request: OpenWorkbench) -> None:
     _require_dash()
     from drivetwin.workbench.access_control import Access
     from drivetwin.workbench.jobs import end_all
-    from drivetwin.workbench.run_folder import remove_dead_folders
     from drivetwin.workbench.server import build_server, start_server
-    from drivetwin.workbench.workspace_folder import Folder
+    from drivetwin.workbench.sessions import remove_dead_folders
+    from drivetwin.workbench.workspace import Folder
 
     place, access = Folder.from_path(request.folder), Access()
     remove_dead_folders()

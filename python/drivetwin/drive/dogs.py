@@ -17,10 +17,9 @@ from itertools import zip_longest
 import numpy as np
 
 from drivetwin.drive.driver import LOCK_UP_RAMP, LONGEST_SHIFT, PEDAL_RAMP, STEP, Driver, State
-from drivetwin.drive.network import BRAKE, PEDAL
 from drivetwin.drive.plan import LONGEST_LEG, Leg, ShiftTo, Watched, list_forward_gears
 from drivetwin.drive.powertrain import Powertrain
-from drivetwin.drive.result import Action
+from drivetwin.drive.result import BRAKE, PEDAL, Action
 from drivetwin.drive.schedule import Schedule
 from drivetwin.drive.shift_plan import CLOSE, FILL, MARGIN, OPEN, RAMP, compute_pressure
 from drivetwin.errors import CardError, InputError, SimulationError
@@ -28,7 +27,7 @@ from drivetwin.gearbox import Gearbox, build_network_elements
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.element_schema import GROUND, list_ports
 from drivetwin.simulation.network import Output, Start, build_element, simulate
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.ratio_card import ShiftKind
 
 ENGAGED = 1e6
 """Torque capacity of an engaged dog, N m: above that of any road vehicle, since teeth hold."""

@@ -15,16 +15,6 @@ from functools import cache
 
 import numpy as np
 
-from drivetwin.drive.network import (
-    BRAKE,
-    LOCK_UP,
-    PEDAL,
-    build_driveline_elements,
-    build_standstill,
-    get_crank,
-    list_energy_outputs,
-    list_outputs,
-)
 from drivetwin.drive.plan import (
     LONGEST_LEG,
     Leg,
@@ -34,7 +24,17 @@ from drivetwin.drive.plan import (
     list_forward_gears,
 )
 from drivetwin.drive.powertrain import Powertrain
-from drivetwin.drive.result import Action
+from drivetwin.drive.result import (
+    BRAKE,
+    LOCK_UP,
+    PEDAL,
+    Action,
+    build_driveline_elements,
+    build_standstill,
+    get_crank,
+    list_energy_outputs,
+    list_outputs,
+)
 from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.drive.shift_plan import CLOSE, FILL, OPEN, RAMP, ShiftPlan, compute_pressure
 from drivetwin.errors import SimulationError

@@ -22,7 +22,7 @@ from drivetwin.gearbox import Gearbox
 from drivetwin.gearbox.spec import Capacity
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.dual_clutch import FloatArray, RoadLoad, Stribeck
-from drivetwin.vehicle.converter import ConverterTable, Curve
+from drivetwin.vehicle.spec import ConverterTable, Curve
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,8 @@ import numpy as np
 from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.dyno.actuators import ControlledActuator
-from drivetwin.dyno.effects import SENSOR_EFFECTS, Effects, check_effects
 from drivetwin.dyno.scenario import Scenario, Sensor
-from drivetwin.dyno.truth import Truth, compute_truth
+from drivetwin.dyno.truth import SENSOR_EFFECTS, Effects, Truth, check_effects, compute_truth
 from drivetwin.errors import InputError, SimulationError, Where
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     NominalRun,

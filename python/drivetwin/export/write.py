@@ -12,9 +12,9 @@ from drivetwin._util.request import REQUIRED, Request, input_file, option
 from drivetwin.export.targets import FmiVersion, Names, Platform, Target
 
 if TYPE_CHECKING:
+    from drivetwin.export.entries import Subject
     from drivetwin.export.fmu.experiment import Experiment
     from drivetwin.export.parameters.content import ParameterSet
-    from drivetwin.export.subject import Subject
     from drivetwin.twin.twin import Twin
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.version import get_program_version
+from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.bus.identify import BusIdentification
 from drivetwin.bus.phases import BusShift
 from drivetwin.files.records import (

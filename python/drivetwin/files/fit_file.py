@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.version import get_program_version
+from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.records import (
     FindingRecord,

@@ -26,9 +26,8 @@ from pydantic import (
 )
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.atomic import write_text
+from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file, write_text
 from drivetwin._util.plain_values import convert_nonfinite, format_json
-from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel

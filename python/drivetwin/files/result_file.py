@@ -11,8 +11,8 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
+from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.plain_values import to_plain_values
-from drivetwin._util.version import get_program_version
 from drivetwin.estimation.identification import Identification, LogPull, LogShare
 from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.estimate import LoadLaw
@@ -32,7 +32,7 @@ from drivetwin.files.records import (
     read_record,
 )
 from drivetwin.shifts.shift import RejectedShift
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.ratio_card import ShiftKind
 
 
 class ConsistencyRecord(Record):

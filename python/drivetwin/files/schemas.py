@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drivetwin.vehicle.card_fields import CardField, read_card_fields
+from drivetwin.vehicle.ratio_card import CardField, read_card_fields
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -50,7 +50,7 @@ _MODELS = {
     FileKind.RATIO_CARD: ("vehicle.ratio_card", "RatioCardFile"),
     FileKind.BUS: ("files.bus_file", "BusFile"),
     FileKind.TCU_CARD: ("tcu.card", "ControllerCardFile"),
-    FileKind.TCU: ("files.tcu_file", "TcuFile"),
+    FileKind.TCU: ("files.tcu_twin_file", "TcuFile"),
     FileKind.TCU_TWIN: ("files.tcu_twin_file", "TcuTwinFile"),
 }
 """Module below the package, and the model there, by which the program itself checks the file; each

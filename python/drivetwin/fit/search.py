@@ -30,7 +30,7 @@ from drivetwin.fit.omissions import ShownOmission, complete_model
 from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.release import release_fixed
 from drivetwin.fit.unknown import SoughtNumber
-from drivetwin.simulation.network_batch import NetworkScenario, simulate_network_batch
+from drivetwin.simulation.network_response import NetworkScenario, simulate_network_batch
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,8 @@ from uuid import uuid4
 
 from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.errors import SchedulerError, Where
-from drivetwin.fleet.events import Listener, Noted
 from drivetwin.fleet.pool import AHEAD, GuardedWorker
-from drivetwin.fleet.task import Reply, Task, WorkerLost, WorkerSpec
+from drivetwin.fleet.task import Listener, Noted, Reply, Task, WorkerLost, WorkerSpec
 
 _FIRST_CONTACT = 10.0
 """Time [s] in which a scheduler must answer at the start ..."""

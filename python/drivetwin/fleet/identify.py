@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.atomic import write_bytes, write_text
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.shiftlog import ShiftLog
@@ -35,7 +37,6 @@ from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.estimation.result.prior_conflict import remove_prior
 from drivetwin.estimation.result.verdict import assess, reject_identified
-from drivetwin.fleet.pages import save_vehicle
 from drivetwin.fleet.parts import convert_write_errors
 from drivetwin.fleet.rows import MU, Found, Row, RowKind, make_estimate_row
 from drivetwin.fleet.scan import compute_input_hashes
@@ -47,6 +48,7 @@ from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.pipeline import identify
 from drivetwin.report.bus import BusOutcome, identify_vehicle
+from drivetwin.report.html import render_report, save_library
 from drivetwin.shifts.detect import FoundShifts, require_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
@@ -56,6 +58,47 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
+
+
+LIBRARY = "plotly.js"
+
+
+def save_single(path: Path, found: Identification, log: ShiftLog) -> None:
+    """Write the report of one log; all reports of a fleet use one library file."""
+    _save_page(path, render_report(found, log, LIBRARY))
+
+
+def save_vehicle(path: Path, outcome: BusOutcome) -> None:
+    """Write the report of the bus logs of one vehicle."""
+    _save_page(path, outcome.render(LIBRARY))
+
+
+def _save_page(path: Path, text: str) -> None:
+    library = path.with_name(LIBRARY)
+    if not library.is_file():
+        save_library(library)
+    write_text(path, text)
+
+
+def save_traces(path: Path, found: Identification) -> None:
+    """Write simulation over measurement as a Parquet table: shift, signal, time [s], values SI."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns: dict[str, list[object]] = {"shift": [], "signal": []}
+    numbers: dict[str, list[np.ndarray[tuple[int], np.dtype[np.float64]]]] = {
+        "time": [], "measured": [], "simulated": [],
+    }  # fmt: skip
+    for number, validation in enumerate(found.evidence.validation):
+        for signal, trace in validation.traces.items():
+            columns["shift"] += [number] * trace.time.size
+            columns["signal"] += [signal] * trace.time.size
+            for name, parts in numbers.items():
+                parts.append(getattr(trace, name))
+    values = {name: np.concatenate([np.empty(0), *parts]) for name, parts in numbers.items()}
+    buffer = BytesIO()
+    pq.write_table(pa.table({**columns, **values}), buffer, compression="zstd")
+    write_bytes(path, buffer.getvalue())
 
 
 _LAW_SIZE = P0
@@ -173,13 +216,9 @@ def _check_inputs(recipe: TaskSpec) -> None:
 def _write_artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
     """Write the report and the traces that are wanted besides. Raises StoreError."""
     if task.report is not None:
-        from drivetwin.fleet.pages import save_single
-
         with convert_write_errors():
             save_single(Path(task.report), found, log)
     if task.traces is not None:
-        from drivetwin.fleet.pages import save_traces
-
         with convert_write_errors():
             save_traces(Path(task.traces), found)
 

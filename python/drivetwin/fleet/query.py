@@ -14,8 +14,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.csv_text import format_csv_row
 from drivetwin._util.optional_dependencies import import_extra
+from drivetwin._util.text import format_csv_row
 from drivetwin.errors import InputError, QueryError, Where
 from drivetwin.fleet.index import ONE_FILE_EACH, Index
 from drivetwin.fleet.rows import RowKind, make_schema

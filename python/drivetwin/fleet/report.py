@@ -16,14 +16,18 @@ from drivetwin._util.atomic import write_text
 from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
 from drivetwin.bus.scatter import METHOD as BUS_METHOD
 from drivetwin.estimation.result.estimate import Z95, Verdict
-from drivetwin.fleet.figures import plot_drift, plot_units
-from drivetwin.fleet.friction import compute_fleet_friction
+from drivetwin.fleet.figures import (
+    collect_unit_figures,
+    compare_units,
+    compute_fleet_friction,
+    merge_figures,
+    plot_drift,
+    plot_units,
+)
+from drivetwin.fleet.identify import LIBRARY
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
-from drivetwin.fleet.mixed_model.observations import collect_facts
-from drivetwin.fleet.mixed_model.reasons import collect_output_fits
-from drivetwin.fleet.mixed_model.result import Interval, JointEstimate, Outlier
-from drivetwin.fleet.pages import LIBRARY
-from drivetwin.fleet.quality import collect_unit_figures, compare_units, merge_figures
+from drivetwin.fleet.mixed_model.mixed import Interval, JointEstimate, Outlier
+from drivetwin.fleet.mixed_model.observations import collect_facts, collect_output_fits
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.rules import format_reading, format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
@@ -45,10 +49,10 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figures.friction import plot_friction
+from drivetwin.report.figures.validation import plot_friction
 from drivetwin.report.html import render_page
-from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.parameters import TONES, make_parameter_cell
+from drivetwin.report.style import get_parameter_label
 from drivetwin.report.whole_drive import build_comparison_table, get_figure_label
 from drivetwin.shifts.quality import QUALITY_UNITS
 

@@ -15,8 +15,8 @@ from functools import lru_cache
 from pathlib import Path
 from time import monotonic
 
-from drivetwin._util.regular_file import compute_digest, measure_regular_file
-from drivetwin._util.version import get_program_version
+from drivetwin._util.atomic import compute_digest, measure_regular_file
+from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
 from drivetwin.estimation.result.method import Method

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
-from drivetwin._util.csv_text import parse_csv_row, restore_cell
-from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
+from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file
+from drivetwin._util.text import parse_csv_row, restore_cell
 from drivetwin.errors import InputError, Where
 from drivetwin.fleet.index import INDEX
 from drivetwin.logs.formats.detect import SUFFIXES

@@ -5,8 +5,12 @@ from __future__ import annotations
 
 from drivetwin.gearbox.card import list_builtin_gearboxes, load_gearbox
 from drivetwin.gearbox.compare import Comparison, compare
-from drivetwin.gearbox.gears import GearStatics, describe_ratio_differences, solve_gear
-from drivetwin.gearbox.maneuver import CouplingError
+from drivetwin.gearbox.maneuver import (
+    CouplingError,
+    GearStatics,
+    describe_ratio_differences,
+    solve_gear,
+)
 from drivetwin.gearbox.network import build_network_elements
 from drivetwin.gearbox.reduction import Reduction, reduce
 from drivetwin.gearbox.spec import Drive, Gearbox

@@ -37,8 +37,7 @@ from drivetwin.gearbox.spec import (
 )
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.simulation.element_schema import GROUND
-from drivetwin.vehicle.converter import ConverterTable
-from drivetwin.vehicle.spec import MOST_INERTIA
+from drivetwin.vehicle.spec import MOST_INERTIA, ConverterTable
 
 Name = Annotated[str, Field(min_length=1)]
 Teeth = Annotated[int, Field(ge=1)]

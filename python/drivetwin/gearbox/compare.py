@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.errors import SimulationError
-from drivetwin.gearbox.gears import solve_gear
 from drivetwin.gearbox.maneuver import (
     CouplingError,
     Maneuver,
@@ -16,6 +15,7 @@ from drivetwin.gearbox.maneuver import (
     build_signals,
     build_time_grid,
     plan,
+    solve_gear,
 )
 from drivetwin.gearbox.network import build_network_elements
 from drivetwin.gearbox.reduction import Reduction

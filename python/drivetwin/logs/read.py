@@ -9,9 +9,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from drivetwin._util.atomic import compute_digest
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages, notify_progress
-from drivetwin._util.regular_file import compute_digest
 from drivetwin.channels.commands import check_commands
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles

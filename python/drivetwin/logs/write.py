@@ -16,8 +16,8 @@ from typing import BinaryIO
 import numpy as np
 
 from drivetwin._util.atomic import open_atomic
-from drivetwin._util.csv_text import format_csv_row
 from drivetwin._util.optional_dependencies import import_extra
+from drivetwin._util.text import format_csv_row
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import resolve_channel_unit
 from drivetwin.errors import FileFormatError, Where

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Help of the element methods: law, and parameters with units, ranges and defaults."""
+"""Arguments of the element methods: plates of a clutch, and help with units, ranges, defaults."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from textwrap import fill
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from drivetwin.modeling.plates import Plates
+from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from drivetwin.simulation.element_schema import ELEMENT_TYPES, ElementType, Field, FieldKind
 
 FIELD_OF = {"at": "node", "value": "input"}
@@ -23,6 +24,40 @@ _WIDTH = 88
 _HARD_SPACE = "\xa0"
 """Space at which no line is broken."""
 _Class = TypeVar("_Class", bound=type)
+
+
+@dataclass(frozen=True)
+class Plates:
+    """Capacity of a clutch: μ(|slip|) · gain · (pressure - p0), static `peak` times that at rest.
+
+    `friction` is a law or a constant μ; gain in m³, p0 in Pa, drum inertia in kg·m². By default
+    the pressure itself is the capacity [N·m]. `drag` are the fields of a table of drag torque over
+    slip, or none.
+    """
+
+    friction: Stribeck | FrictionTable | float = 1.0
+    gain: float = 1.0
+    p0: float = 0.0
+    peak: float = 1.0
+    drum_inertia: float = 0.0
+    drag: Mapping[str, Any] | None = None
+
+    def describe(self) -> dict[str, Any]:
+        """Return the fields of the element."""
+        law = self.friction
+        friction: Any = (
+            asdict(law)
+            if isinstance(law, Stribeck | FrictionTable)
+            else {"slip": [0.0], "mu": [law]}
+        )
+        return {
+            "friction": friction,
+            "gain": self.gain,
+            "p0": self.p0,
+            "peak": self.peak,
+            "drum_inertia": self.drum_inertia,
+            **({} if self.drag is None else {"drag": dict(self.drag)}),
+        }
 
 
 def document_methods(methods: _Class) -> _Class:

@@ -7,10 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drivetwin.modeling.component import Component
-from drivetwin.modeling.element_help import document_methods
-from drivetwin.modeling.model_components import ModelComponents, Place
-from drivetwin.modeling.plates import Plates
+from drivetwin.modeling.element_help import Plates, document_methods
+from drivetwin.modeling.model_components import Component, ModelComponents, Place
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.network import InputValue
 

@@ -27,9 +27,8 @@ from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Recording
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
-from drivetwin.modeling.component import Component, Node
 from drivetwin.modeling.element_methods import ElementMethods
-from drivetwin.modeling.model_components import Place
+from drivetwin.modeling.model_components import Component, Node, Place
 from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
 from drivetwin.simulation.element_schema import find_element_faults, refuse_faults

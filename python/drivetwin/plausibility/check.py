@@ -16,9 +16,8 @@ from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.plausibility.entries import PLAUSIBILITY, check_entries, find_entry
 from drivetwin.plausibility.friction import check_friction, check_inertias, sample_span
-from drivetwin.shifts.causes import find_causes
-from drivetwin.shifts.held_ratios import HeldRatio, find_held_ratios, is_held
-from drivetwin.shifts.kinematics import resample_speeds
+from drivetwin.shifts.coverage import find_causes
+from drivetwin.shifts.kinematics import HeldRatio, find_held_ratios, is_held, resample_speeds
 from drivetwin.shifts.shift import Shift, ShiftSettings
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard

@@ -33,9 +33,8 @@ from drivetwin.report.blocks import (
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.html import render_page
-from drivetwin.report.labels import get_parameter_label
 from drivetwin.report.sections.parameters import build_parameter_blocks
-from drivetwin.report.style import BAND, MEASURED, OVER, SIMULATED, UNDER
+from drivetwin.report.style import BAND, MEASURED, OVER, SIMULATED, UNDER, get_parameter_label
 from drivetwin.vehicle.ratio_card import RatioCard
 
 _HEIGHT = 130

@@ -35,13 +35,13 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figure import Figure, make_trace
-from drivetwin.report.figures.calibration import (
+from drivetwin.report.html import render_page
+from drivetwin.report.style import SIMULATED, make_axis, make_layout
+from drivetwin.report.trial import (
     get_metric_display,
     plot_distributions,
     plot_profiles,
 )
-from drivetwin.report.html import render_page
-from drivetwin.report.style import SIMULATED, make_axis, make_layout
 
 _TONES = {
     LimitState.CERTIFIED: Tone.GOOD,

@@ -12,8 +12,8 @@ from drivetwin._util.display_units import (
     format_significant,
     get_display_unit,
 )
+from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.progress import notify_progress
-from drivetwin._util.version import get_program_version
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.validation import Validation
@@ -40,9 +40,9 @@ from drivetwin.report.figures.comparison import (
 )
 from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
 from drivetwin.report.html import render_page
-from drivetwin.report.labels import get_estimate_label
-from drivetwin.report.sections.fits import build_labelled_fits
 from drivetwin.report.sections.parameters import make_estimate_cell, make_value_cell
+from drivetwin.report.sections.summary import build_labelled_fits
+from drivetwin.report.style import get_estimate_label
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import SIGNALS, simulate_shift

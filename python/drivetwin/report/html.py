@@ -28,7 +28,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages, notify_progress
-from drivetwin._util.visible_text import escape_text, escape_values
+from drivetwin._util.text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification, Several
 from drivetwin.report.blocks import Block, FigureBlock, Section, build_findings_section

@@ -19,7 +19,7 @@ from drivetwin.files.bus_file import BUS_SCHEMA, BusFile
 from drivetwin.files.fit_file import FIT_SCHEMA, FitFile
 from drivetwin.files.records import FitRecord, ParameterRecord, Record, read_record
 from drivetwin.files.result_file import RESULT_SCHEMA, ResultFile
-from drivetwin.files.tcu_file import TCU_SCHEMA, TcuFile
+from drivetwin.files.tcu_twin_file import TCU_SCHEMA, TcuFile
 from drivetwin.files.twin_file import load_twin
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.parameters import ParameterSpec

@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from drivetwin._util.escaping_console import EscapingConsole
-from drivetwin._util.visible_text import escape_text
+from drivetwin._util.text import escape_text
 from drivetwin.report.blocks import (
     Block,
     Cell,

@@ -18,14 +18,20 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figure import Figure
-from drivetwin.report.figures.recording import plot_shift_phases
+from drivetwin.report.figures.validation import plot_shift_phases
 from drivetwin.report.html import render_page
 from drivetwin.report.style import get_candidate_style, make_axis, make_layout
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
-from drivetwin.shifts.statistics import LEVEL, Trend
-from drivetwin.shifts.summary import SUMMARIZED, FigureComparison, ShiftGroup, summarize_shifts
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.shifts.summary import (
+    LEVEL,
+    SUMMARIZED,
+    FigureComparison,
+    ShiftGroup,
+    Trend,
+    summarize_shifts,
+)
+from drivetwin.vehicle.ratio_card import ShiftKind
 
 _BESIDE = 3
 """So many shifts beside each other in a table."""

@@ -21,7 +21,7 @@ from drivetwin.shifts.candidate import (
     detect_gear_runs,
     find_resting_ratio,
 )
-from drivetwin.shifts.causes import find_causes
+from drivetwin.shifts.coverage import find_causes
 from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import RejectedShift, Shift, ShiftSettings

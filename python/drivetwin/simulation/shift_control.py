@@ -19,7 +19,7 @@ from drivetwin._native import simulate_controlled as native_simulate_controlled
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import ControllerError, InputError, Where
 from drivetwin.simulation.batch import stack_sets
-from drivetwin.simulation.controller_library import load_library
+from drivetwin.simulation.driveline_run import load_library
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
     FloatArray,
@@ -28,7 +28,7 @@ from drivetwin.simulation.dual_clutch import (
     to_delayed_core_samples,
 )
 from drivetwin.simulation.network import Element, Output, Start
-from drivetwin.simulation.network_batch import NetworkScenario, resolve_native
+from drivetwin.simulation.network_response import NetworkScenario, resolve_native
 from drivetwin.simulation.network_sensitivity import require_numbers
 from drivetwin.simulation.serialize import as_array, as_json
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joint distribution of what the model of a shift depends on, as a twin knows it.
+"""Joint distribution of what the model of a shift depends on, its friction law included.
 
 The one place from which drivelines are drawn: calibration and observer use it.
 """
@@ -12,21 +12,73 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.result.estimate import FrictionCurve
+from drivetwin._util.arrays import FloatArray, propagate_variance
+from drivetwin.estimation.direct.friction_law import build_law_derivatives
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.parameters import LAW_KEYS, OVER_ETA, SPECS, make_law_id
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS, PROGRESSION
 from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, ShiftElement, Stribeck
-from drivetwin.twin.friction_law import (
-    build_partner_spread,
-    compute_law_covariance,
-    compute_scale_std,
-    to_law,
-    to_values,
-)
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.spec import describe_partner_level
+from drivetwin.vehicle.spec import PARTNER_REST_STD, describe_partner_level
+
+
+def to_values(law: Stribeck) -> FloatArray:
+    """Return the values (4,) of a law."""
+    return np.array([law.mu_c, law.mu_s - law.mu_c, law.mu_v, np.log(law.v_s)])
+
+
+def to_law(values: FloatArray) -> Stribeck:
+    """Return the law of values (4,)."""
+    mu_c, drop, mu_v, ln_v_s = (float(one) for one in values)
+    return Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v)
+
+
+def build_from_law(law: Stribeck) -> FloatArray:
+    """Build the derivatives (4, 4) of the values by the fields of a law."""
+    return np.asarray(np.linalg.inv(build_law_derivatives(law.v_s)), dtype=np.float64)
+
+
+def compute_law_covariance(curve: FrictionCurve) -> FloatArray | None:
+    """Compute the covariance (4, 4) of the values of a curve; None where it has none."""
+    if curve.stribeck is None or curve.stribeck_covariance is None:
+        return None
+    rows = build_from_law(curve.stribeck)
+    return np.asarray(rows @ curve.stribeck_covariance @ rows.T)
+
+
+def compute_friction_std(curve: FrictionCurve | None) -> float:
+    """Relative standard deviation of μ times gain in the middle of its curve; 0 without one.
+
+    That of the gain alone is left out: the motion depends on the product.
+    """
+    if curve is None:
+        return 0.0
+    curve = curve.drop_gain_spread()
+    half = 0.5 * (curve.mu_hi - curve.mu_lo) / np.abs(curve.mu)
+    half = half[np.isfinite(half)]
+    return float(np.median(half)) / Z95 if half.size else 0.0
+
+
+def compute_scale_std(curve: FrictionCurve | None) -> float:
+    """Relative standard deviation of μ times gain beside the covariance of its law."""
+    whole = compute_friction_std(curve)
+    covariance = None if curve is None else compute_law_covariance(curve)
+    if curve is None or curve.stribeck is None or covariance is None:
+        return whole
+    slopes = curve.stribeck.compute_slopes(curve.slip)
+    variance = propagate_variance(slopes.T, covariance) / curve.mu**2
+    return float(np.sqrt(max(whole**2 - float(np.median(variance)), 0.0)))
+
+
+def build_partner_spread(law: Stribeck, level: float) -> FloatArray:
+    """Build the covariance (4, 4) by which the values of an element's law depart from those of its
+    partner's `law`, where the log does not determine them; `level` is the standard deviation of
+    their ratio [-]."""
+    scaled = to_values(law) * np.array([1.0, 1.0, 1.0, 0.0])
+    rest = np.array([0.0, PARTNER_REST_STD, 0.0, 0.0])
+    return level**2 * np.outer(scaled, scaled) + np.outer(rest, rest)
+
 
 _NEGLIGIBLE = 1e-9
 """Variance of a direction over the largest below which it is rounding [ratio]."""

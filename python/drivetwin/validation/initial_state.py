@@ -1,18 +1,100 @@
 # SPDX-License-Identifier: MIT
-"""Start of a simulation from the first measured moments of a gear that is held."""
+"""Initial state, command pressures and identified range of a simulated log."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
-from drivetwin.errors import MissingChannelError, Where
+from drivetwin.errors import MissingChannelError, MissingParameterError, Where
+from drivetwin.estimation.data.actuators import compute_pressure_channel
 from drivetwin.estimation.data.noise import estimate_white_noise
+from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import Shift
-from drivetwin.simulation.dual_clutch import DualClutch, State
+from drivetwin.simulation.dual_clutch import DualClutch, State, Trajectory
+from drivetwin.twin.twin import Twin
+
+
+def replace_pressures(twin: Twin, log: ShiftLog) -> tuple[ShiftLog, tuple[str, ...]]:
+    """Return the log with the pressures that follow from its commands, and their elements.
+
+    Pressures of other elements stay as measured. Raises MissingParameterError where the twin has no
+    actuator, and MissingChannelError where the log has no command to any of them.
+    """
+    if not twin.actuators:
+        raise MissingParameterError(
+            "the twin has no model of an actuator",
+            "identify from a log with commanded pressures (role "
+            "pressure_command.<element>), or state [elements.<name>.actuator] on the vehicle card",
+            Where(file=twin.name),
+        )
+    made = {
+        name: compute_pressure_channel(log[make_command_role(name)], one.model, name)
+        for name, one in twin.actuators.items()
+        if make_command_role(name) in log
+    }
+    if not made:
+        roles = ", ".join(map(make_command_role, twin.actuators))
+        raise MissingChannelError(
+            f"the log has no commanded pressure: none of {roles}",
+            "name the columns in a channel mapping file (--channels)",
+            Where(file=log.source),
+        )
+    pressures = {make_pressure_role(name): channel for name, channel in made.items()}
+    return replace(log, channels={**log.channels, **pressures}), tuple(made)
+
+
+CARRIES = 0.02
+"""Share of a run's largest clutch torque from which an element's slip asks for its friction."""
+
+
+def name_ends(
+    reached: tuple[float, float], limits: tuple[float, float], unit: str
+) -> dict[str, Number]:
+    """Return the ends of the range reached by a run and of its limits, for a finding."""
+    names = ("low", "high", "limit_low", "limit_high")
+    return {n: Number(x, unit) for n, x in zip(names, (*reached, *limits), strict=True)}
+
+
+def collect_loaded_slip(run: Trajectory) -> list[FloatArray]:
+    """|slip| of each element while it carries torque [rad/s]; an open one may turn at any speed."""
+    torques = {name: np.abs(torque) for name, torque in run.clutch_torque.items()}
+    least = CARRIES * max(float(np.nanmax(torque)) for torque in torques.values())
+    return [np.abs(slip[torques[name] > least]) for name, slip in run.slip.items()]
+
+
+_RANGES = {"slip": "rad/s", "pressure": "Pa", "torque": "N*m", "speed": "rad/s"}
+"""Units of what a twin has a range of."""
+
+
+def check_range(
+    name: str, arrays: list[FloatArray], limits: tuple[float, float], place: Where | None = None
+) -> list[Finding]:
+    """Return a finding where arrays of quantity `name` leave the range identified."""
+    if (reached := find_range_excess(arrays, limits)) is None:
+        return []
+    ends = name_ends(reached, limits, _RANGES[name])
+    return [report(Code.OUTSIDE_IDENTIFIED_RANGE, name, place, **ends)]
+
+
+def find_range_excess(
+    arrays: list[FloatArray], limits: tuple[float, float]
+) -> tuple[float, float] | None:
+    """Least and greatest value; None where no value lies clearly beyond the limits."""
+    values = np.concatenate(arrays)
+    values = values[np.isfinite(values)]
+    if values.size == 0:
+        return None
+    low, high = float(values.min()), float(values.max())
+    margin = 0.02 * (limits[1] - limits[0])
+    if low >= limits[0] - margin and high <= limits[1] + margin:
+        return None
+    return low, high
+
 
 _SPAN = 0.08
 """Length of the local fit [s]: well under a period of the shaft oscillation."""

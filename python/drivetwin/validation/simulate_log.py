@@ -26,13 +26,14 @@ from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin
 from drivetwin.validation.gate import assess_model
-from drivetwin.validation.identified_range import (
+from drivetwin.validation.initial_state import (
     check_range,
     collect_loaded_slip,
+    estimate_start_state,
+    find_quiescent_time,
     find_range_excess,
     name_ends,
 )
-from drivetwin.validation.initial_state import estimate_start_state, find_quiescent_time
 from drivetwin.vehicle.spec import PriorValue
 
 SIGNALS = ("output_torque", "input_speed", "output_speed")

@@ -21,11 +21,11 @@ from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.mapping_file import ByRole, ChannelTable
 from drivetwin.channels.units import BAR, IN_BAR, IN_RPM
 from drivetwin.simulation.dual_clutch import LossLaw
-from drivetwin.vehicle.converter import ConverterTable
 from drivetwin.vehicle.effects import EffectPrior
 from drivetwin.vehicle.spec import (
     MOST_INERTIA,
     ClutchGeometry,
+    ConverterTable,
     ElementSpec,
     Gear,
     PriorValue,

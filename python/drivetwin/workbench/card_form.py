@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from drivetwin.authoring.answers import Key
 from drivetwin.authoring.card_text import format_card, refuse_faults
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
-from drivetwin.authoring.question import FormEntry
+from drivetwin.authoring.question import FormEntry, Key
 from drivetwin.authoring.questions import Sources
 from drivetwin.authoring.session import Session
 from drivetwin.errors import InputError

@@ -25,8 +25,7 @@ from drivetwin.channels.units import (
     resolve_channel_unit,
 )
 from drivetwin.errors import MappingError, UnitError, Where
-from drivetwin.logs.mapping_draft import draft_mapping
-from drivetwin.logs.survey import Column, Survey
+from drivetwin.logs.survey import Column, Survey, draft_mapping
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from drivetwin.authoring.log_survey import (
     survey_log,
 )
 from drivetwin.channels.mapping import Mapped, combine_specs
-from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.channels.mapping_text import format_mapping
+from drivetwin.channels.mapping_file import format_mapping, read_mapping
 from drivetwin.channels.roles import get_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import Proposal, propose_time_units

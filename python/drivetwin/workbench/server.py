@@ -21,7 +21,7 @@ from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_callback_requests, escape_callback_responses
 from drivetwin.workbench.views.page import Start, build_page
-from drivetwin.workbench.workspace_folder import Folder
+from drivetwin.workbench.workspace import Folder
 
 SESSION_HEADER = "X-Drivetwin-Session"
 

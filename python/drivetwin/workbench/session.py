@@ -13,14 +13,13 @@ from typing import IO, Any
 
 from drivetwin._util.atomic import write_text
 from drivetwin.authoring import card_edit
-from drivetwin.authoring.answers import Key
 from drivetwin.authoring.card_text import refuse_faults
 from drivetwin.authoring.log_survey import LogSurvey
+from drivetwin.authoring.question import Key
 from drivetwin.channels.mapping_file import find_project_mapping
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.files import format_card, format_log
 from drivetwin.dyno.names import ScenarioName
-from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.dyno.scenario_file import format_card, format_log, load_scenario
 from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
@@ -29,12 +28,11 @@ from drivetwin.report.figure import Figure
 from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
 from drivetwin.workbench.card_form import CardForm
-from drivetwin.workbench.identifying import Task, identify_all, identify_bus_logs
+from drivetwin.workbench.identifying import Boundary, Task, identify_all, identify_bus_logs
 from drivetwin.workbench.mapping import Corrections, Entry, apply_entries
-from drivetwin.workbench.phases import Boundary
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
 from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
-from drivetwin.workbench.workspace_folder import Folder
+from drivetwin.workbench.workspace import Folder
 from drivetwin.workbench.zoom import View
 
 MOST_UPLOADS = 8

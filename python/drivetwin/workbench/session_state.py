@@ -18,9 +18,8 @@ from drivetwin.validation.multi_log import Source as FitSource
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
 from drivetwin.vehicle.ratio_card import RatioCard
-from drivetwin.workbench.identifying import BusTask, Outcome, Refusal
+from drivetwin.workbench.identifying import Boundary, BusTask, Outcome, Refusal, move_boundaries
 from drivetwin.workbench.mapping import Corrections
-from drivetwin.workbench.phases import Boundary, move_boundaries
 from drivetwin.workbench.sandboxed_parse import Opened
 
 MOST_LOGS = 6

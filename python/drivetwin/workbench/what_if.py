@@ -16,8 +16,7 @@ from drivetwin.report.blocks import make_link
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
-from drivetwin.report.labels import get_parameter_name
-from drivetwin.report.style import COMPARED
+from drivetwin.report.style import COMPARED, get_parameter_name
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS
 from drivetwin.simulation.dual_clutch import (

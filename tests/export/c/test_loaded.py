@@ -15,8 +15,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from drivetwin.export.c.loaded import STATUS, CModel, CObserver, CRun, Precision
-from drivetwin.export.entries import get_lock_index, list_entries, start_entries
-from drivetwin.export.subject import compute_steady_start
+from drivetwin.export.entries import (
+    compute_steady_start,
+    get_lock_index,
+    list_entries,
+    start_entries,
+)
 from drivetwin.export.targets import InputKind
 from drivetwin.simulation.dual_clutch import (
     DualClutch,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.export.modelica.component import make_identifier
+from drivetwin.export.modelica.inputs import make_identifier
 from drivetwin.export.modelica.model import Run, format_package
 from drivetwin.gearbox import build_network_elements, load_gearbox
 from drivetwin.simulation.dual_clutch import Signal

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
+from drivetwin.export.entries import Subject
 from drivetwin.export.fmu.experiment import Experiment
 from drivetwin.export.modelica.model import format_modelica, write_modelica
-from drivetwin.export.subject import Subject
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     DualClutch,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from drivetwin.errors import ReaderFailureError
-from drivetwin.logs.formats.mat_size import refuse_expansion
+from drivetwin.logs.formats.mat import refuse_expansion
 from drivetwin.logs.read import read_raw
 from tests.workbench.bad_files import hdf5_bomb, mat_bomb
 

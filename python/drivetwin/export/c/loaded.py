@@ -18,7 +18,7 @@ import numpy as np
 from drivetwin.errors import InputError
 from drivetwin.export.c.write import read_model_sources, write_c
 from drivetwin.export.compiler import compile_library
-from drivetwin.export.subject import Subject
+from drivetwin.export.entries import Subject
 from drivetwin.simulation.dual_clutch import FloatArray
 
 _CONSTANT = re.compile(r"#define DT_(\w+) (\d+)\b")

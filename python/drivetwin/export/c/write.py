@@ -11,16 +11,16 @@ from importlib import resources
 from pathlib import Path
 
 from drivetwin._util.atomic import write_bytes
-from drivetwin._util.visible_text import escape_text
+from drivetwin._util.text import escape_text
 from drivetwin.errors import InputError
 from drivetwin.export.entries import (
     Entry,
+    Subject,
     delay_entries,
     get_lock_index,
     list_entries,
     start_entries,
 )
-from drivetwin.export.subject import Subject
 from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, State
 from drivetwin.simulation.serialize import as_json
 

@@ -19,12 +19,10 @@ from drivetwin._util.atomic import write_bytes
 from drivetwin.errors import InputError
 from drivetwin.export.c.write import generate_twin_source, read_model_sources
 from drivetwin.export.compiler import compile_library, detect_platform
-from drivetwin.export.entries import list_entries
-from drivetwin.export.fmu.describe import Header, build_description
+from drivetwin.export.entries import Subject, list_entries
+from drivetwin.export.fmu.describe import Header, build_description, list_variables
 from drivetwin.export.fmu.experiment import Experiment, build_reference_files
-from drivetwin.export.fmu.variables import list_variables
-from drivetwin.export.parameters.xml_text import format_document
-from drivetwin.export.subject import Subject
+from drivetwin.export.parameters.spelling import format_document
 from drivetwin.export.targets import DEFAULT_STEP, FmiVersion, Platform
 
 _FOLDERS = {

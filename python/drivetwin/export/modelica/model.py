@@ -17,25 +17,23 @@ import numpy as np
 
 from drivetwin._util.atomic import write_text
 from drivetwin.errors import InputError
-from drivetwin.export.modelica.component import (
+from drivetwin.export.entries import Subject
+from drivetwin.export.modelica.elements import build_part
+from drivetwin.export.modelica.inputs import (
     ROTATIONAL,
     Component,
+    Inputs,
     Names,
     Part,
+    format_equations,
     format_string,
+    format_table,
     make_identifier,
     make_identifiers,
     read_helper,
-)
-from drivetwin.export.modelica.elements import build_part
-from drivetwin.export.modelica.inputs import (
-    Inputs,
-    format_equations,
-    format_table,
     select_sampled,
 )
 from drivetwin.export.parameters.content import format_number
-from drivetwin.export.subject import Subject
 from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal
 from drivetwin.simulation.element_schema import GROUND, list_ports

@@ -21,19 +21,17 @@ from drivetwin.export.parameters.content import (
     parse_finite,
 )
 from drivetwin.export.parameters.spelling import (
+    add_child,
     append_axis,
+    format_comment,
+    format_document,
+    get_text,
     parse_tool_unit,
+    parse_xml,
     split_axis,
     to_dotted_name,
     to_one_line,
     to_tool_unit,
-)
-from drivetwin.export.parameters.xml_text import (
-    add_child,
-    format_comment,
-    format_document,
-    get_text,
-    parse_xml,
 )
 
 _DOCTYPE = (

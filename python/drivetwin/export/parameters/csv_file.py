@@ -10,7 +10,7 @@ import csv
 from itertools import groupby, takewhile
 from pathlib import Path
 
-from drivetwin._util.csv_text import NumberText, format_csv_row, parse_csv_row, restore_cell
+from drivetwin._util.text import NumberText, format_csv_row, parse_csv_row, restore_cell
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.export.parameters.content import (
     Axis,

@@ -7,9 +7,8 @@ from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 
-from drivetwin._util.atomic import write_text
+from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file, write_text
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters import cdfx, csv_file, dcm, matlab, ssv
 from drivetwin.export.parameters.content import ParameterSet

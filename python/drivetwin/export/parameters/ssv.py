@@ -22,12 +22,14 @@ from drivetwin.export.parameters.content import (
     format_number,
     parse_finite,
 )
-from drivetwin.export.parameters.spelling import parse_base_units, to_dotted_name, to_one_line
-from drivetwin.export.parameters.xml_text import (
+from drivetwin.export.parameters.spelling import (
     add_child,
     format_comment,
     format_document,
+    parse_base_units,
     parse_xml,
+    to_dotted_name,
+    to_one_line,
 )
 
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"

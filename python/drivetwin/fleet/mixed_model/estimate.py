@@ -11,25 +11,23 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from drivetwin.fleet.mixed_model.mixed import (
+    Drift,
     FloatArray,
     IntArray,
+    JointEstimate,
     MixedFit,
     Observations,
+    Outlier,
+    Points,
+    UnitValue,
     fit_mixed_model,
 )
 from drivetwin.fleet.mixed_model.observations import (
     LogFacts,
     Observed,
+    attach_reasons,
     collect_facts,
     collect_observations,
-)
-from drivetwin.fleet.mixed_model.reasons import attach_reasons
-from drivetwin.fleet.mixed_model.result import (
-    Drift,
-    JointEstimate,
-    Outlier,
-    Points,
-    UnitValue,
 )
 from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store

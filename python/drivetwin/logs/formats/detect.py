@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from drivetwin._util.regular_file import measure_regular_file
+from drivetwin._util.atomic import measure_regular_file
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.texts import refuse_bus_tool
@@ -81,7 +81,7 @@ FORMATS: tuple[LogFormat, ...] = (
         guarded=True,
     ),
     LogFormat("parquet.open_parquet", (".parquet",), (b"PAR1",), guarded=True),
-    LogFormat("arrow.open_arrow", (".feather", ".arrow"), (b"ARROW1",), guarded=True),
+    LogFormat("parquet.open_arrow", (".feather", ".arrow"), (b"ARROW1",), guarded=True),
     LogFormat("can.open.open_blf", (".blf",), (b"LOGG",), guarded=True),
     LogFormat(
         "can.open.open_bus_text", (".asc", ".trc", ".log"), recognises="can.texts.is_bus_text"

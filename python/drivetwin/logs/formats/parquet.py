@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reader of Parquet tables, by pyarrow: units from the metadata, null is no sample."""
+"""Reader of Parquet and Arrow tables by pyarrow: units from the metadata, null is no sample."""
 
 from __future__ import annotations
 
@@ -26,6 +26,34 @@ from drivetwin.logs.raw import (
     find_origin,
     subtract_origin,
 )
+
+_ARROW_KIND = "an Arrow file"
+
+
+@contextmanager
+def open_arrow(path: Path, options: ReadOptions) -> Iterator[Recording]:
+    """Open an Arrow IPC file with one time column; see `open_parquet` for names and errors."""
+    ipc = import_extra("pyarrow.ipc", "io", _ARROW_KIND, path)
+    with path.open("rb") as file:
+        with handle_parser_errors(_ARROW_KIND, path):
+            recording = ParquetRecording(_Table(ipc, file), path, options, _ARROW_KIND)
+        yield recording
+
+
+class _Table:
+    """An open file with the methods of a Parquet file that its recording uses."""
+
+    def __init__(self, ipc: Any, file: Any) -> None:
+        self._ipc = ipc
+        self._file = file
+        self.schema_arrow = ipc.open_file(file).schema
+
+    def read(self, columns: Sequence[str]) -> Any:
+        """Return a table of all columns of these names."""
+        wanted = [k for k, name in enumerate(self.schema_arrow.names) if name in columns]
+        options = self._ipc.IpcReadOptions(included_fields=wanted)
+        return self._ipc.open_file(self._file, options=options).read_all()
+
 
 _KIND = "a Parquet file"
 _UNIT_KEYS = ("unit", "units", "Unit")

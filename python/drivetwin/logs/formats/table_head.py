@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import BinaryIO
 
-from drivetwin._util.csv_text import restore_cell
+from drivetwin._util.text import restore_cell
 from drivetwin.channels.names import is_time_name, split_name_and_unit
 from drivetwin.channels.read_options import TimeColumn
 from drivetwin.channels.units import find_unit, is_unit

@@ -9,12 +9,16 @@ import numpy as np
 
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.report.figure import Figure, make_trace
-from drivetwin.report.figures.friction import draw_band
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
-from drivetwin.report.figures.validation import OUTPUTS
+from drivetwin.report.figures.validation import OUTPUTS, draw_band
 from drivetwin.report.find_reports import Agreement, Trial
-from drivetwin.report.labels import get_estimate_label
-from drivetwin.report.style import MUTED, get_candidate_style, make_axis, make_layout
+from drivetwin.report.style import (
+    MUTED,
+    get_candidate_style,
+    get_estimate_label,
+    make_axis,
+    make_layout,
+)
 
 _ROW = 0.7
 """Share of the height of a row that the candidates of one parameter take up."""

@@ -39,9 +39,9 @@ from drivetwin.report.blocks import (
 from drivetwin.report.figures.comparison import plot_agreement
 from drivetwin.report.figures.validation import plot_validation
 from drivetwin.report.find_reports import Candidate, compare_estimates
-from drivetwin.report.labels import get_channel_display, get_channel_label, get_parameter_label
-from drivetwin.report.sections.fits import build_fit_table, make_fit_cell
 from drivetwin.report.sections.parameters import make_parameter_cell, make_value_cell
+from drivetwin.report.sections.summary import build_fit_table, make_fit_cell
+from drivetwin.report.style import get_channel_display, get_channel_label, get_parameter_label
 from drivetwin.validation.simulate_log import SIGNALS
 
 _TONES = {

@@ -11,10 +11,9 @@ from dash import ALL, Input, Output, State, ctx, html, no_update
 from dash.development.base_component import Component
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from drivetwin.authoring.answers import Key
-from drivetwin.authoring.question import FormEntry
+from drivetwin.authoring.question import FormEntry, Key
 from drivetwin.errors import RefusedError
-from drivetwin.vehicle.card_fields import get_card_field
+from drivetwin.vehicle.ratio_card import get_card_field
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session

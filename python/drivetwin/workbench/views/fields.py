@@ -19,7 +19,7 @@ from dash.exceptions import CallbackException
 from flask import Flask, Response, request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from drivetwin._util.visible_text import show_json_escapes
+from drivetwin._util.text import show_json_escapes
 from drivetwin.errors import RefusedError
 from drivetwin.workbench.access_control import make_refusal
 

@@ -14,10 +14,9 @@ from drivetwin._util.display_units import format_significant
 from drivetwin.errors import DrivetwinError, InputError, MissingParameterError
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.figures.stack import Panel
-from drivetwin.report.sections.fits import build_labelled_fits
+from drivetwin.report.sections.summary import build_labelled_fits
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import can_fix
-from drivetwin.workbench.exports import Record
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState
@@ -25,6 +24,7 @@ from drivetwin.workbench.steps import Step
 from drivetwin.workbench.views import locks, log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import render_table
+from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
 from drivetwin.workbench.views.log_choice import Place, build_log_choice
 from drivetwin.workbench.what_if import (

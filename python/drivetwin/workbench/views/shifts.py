@@ -13,20 +13,20 @@ from dash.development.base_component import Component
 from drivetwin.findings import render
 from drivetwin.report.blocks import TableBlock, make_table
 from drivetwin.report.bus import build_phase_table as build_bus_phases
-from drivetwin.report.figures.recording import build_shift_panels
 from drivetwin.report.figures.stack import Panel
+from drivetwin.report.figures.validation import build_shift_panels
 from drivetwin.report.sections.summary import build_phase_table, describe_phases
 from drivetwin.report.whole_drive import build_quality_tables, build_summary_tables
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.shifts.summary import summarize_shifts
-from drivetwin.workbench.page_words import replace_options
-from drivetwin.workbench.phases import (
+from drivetwin.workbench.identifying import (
     LABELS,
     get_display_times,
     parse_drag,
     parse_times,
     plot_phases,
 )
+from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog, SessionState
 from drivetwin.workbench.views import log_choice, zooming

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
-from drivetwin._util.regular_file import LARGEST_RECORD, measure_regular_file
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
 from drivetwin.logs.formats.code_texts import CodeValues, interpret_codes

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.regular_file import LARGEST_RECORD
+from drivetwin._util.atomic import LARGEST_RECORD
 from drivetwin.logs.formats.frames import (
     EXTENDED_BIT,
     FD_LENGTHS,
