@@ -13,6 +13,7 @@ import pytest
 from drivetwin.calibration.metrics import Metric, list_outputs
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.simulation.network import simulate
+from drivetwin.simulation.shift_control import SpeedSensor
 from tests.calibration.cases import (
     draw,
     make_nominal,
@@ -128,3 +129,33 @@ def test_inputs_of_a_closed_loop_are_those_of_its_nominal_profiles() -> None:
     assert depth > 0.0
     assert found[Metric.TORQUE_REDUCTION] == pytest.approx([depth])
     assert found[Metric.PRESSURE_RATE] == pytest.approx([max(rates) / shift.step])
+
+
+def test_a_controller_has_the_speeds_of_the_sensors() -> None:
+    """The intervention begins where the slip of the off-going element is seen."""
+    task = make_task(policy=PolicyKind.SLIP, sensors={"engine_speed": SpeedSensor()})
+    shift, control, draws = task.maneuver, start(task), draw(task, 3)
+
+    def run(**given: float) -> tuple[Any, Any]:
+        sensors = [one.sensors for one in draws.units]
+        changed = [replace(one, output=SpeedSensor(**given), engine=SpeedSensor(**given))
+                   for one in sensors]  # fmt: skip
+        units = [replace(a, sensors=b) for a, b in zip(draws.units, changed, strict=True)]
+        found = make_plant(shift).simulate(
+            control, replace(draws, units=units), list_outputs(shift)
+        )
+        assert found.inputs is not None
+        command = found.inputs[:, 3]
+        return command, shift.time[(command != command[:, :1]).argmax(axis=1)]
+
+    bare = replace(draws, units=[replace(one, sensors=None) for one in draws.units])
+    expected = make_plant(shift).simulate(control, bare, list_outputs(shift)).inputs
+    exact, begin = run()
+    assert expected is not None
+    np.testing.assert_allclose(exact, expected[:, 3], atol=1e-6)
+    np.testing.assert_allclose(run(delay=0.01)[1], begin + 0.01, atol=2e-3)
+    assert (np.ptp(run(quantum=1e4)[0], axis=1) == 0.0).all()
+    noisy, again = run(noise=0.3)[0], run(noise=0.3)[0]
+    np.testing.assert_array_equal(noisy, again)
+    assert 0.0 < np.abs(noisy - exact).max() < 0.5 * np.ptp(exact)
+    assert (run(period=0.04)[1] >= begin).all()

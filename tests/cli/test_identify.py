@@ -14,6 +14,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.files.twin_file import load_twin
 from drivetwin.report.blocks import Outcome
 from tests.cli.conftest import Files
 
@@ -46,6 +47,13 @@ def test_writes_exactly_three_files(written: Written) -> None:
     names = {path.name for path in written.folder.iterdir()}
     assert names == {"result.json", "twin.toml", "report.html"}
     assert [path.name for path in written.folder.parent.iterdir()] == ["out"]
+
+
+def test_the_twin_has_the_sensors_of_the_log(written: Written) -> None:
+    sensors = load_twin(written.folder / "twin.toml").sensors
+    for name, noise in (("engine_speed", 0.05), ("output_speed", 0.03)):
+        assert sensors[name].period == pytest.approx(1e-3)
+        assert sensors[name].noise == pytest.approx(noise, rel=0.05)
 
 
 def test_json_is_the_result_file_and_the_files_written(written: Written) -> None:

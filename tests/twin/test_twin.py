@@ -13,6 +13,7 @@ from drivetwin.errors import InputError, MissingParameterError, ResultFileError
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
+from drivetwin.simulation.shift_control import SpeedSensor
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report.sample import SHIFT, STRIBECK, card, identification
@@ -202,8 +203,10 @@ def test_the_card_it_carries_reads_a_log_as_the_vehicles_own(twin: Twin, tmp_pat
 
 
 def test_round_trip(twin: Twin, tmp_path: Path) -> None:
+    twin = replace(twin, sensors={"engine_speed": SpeedSensor(0.05, 0.1, 0.01, 0.02)})
     save_twin(tmp_path / "twin.toml", twin)
     back = load_twin(tmp_path / "twin.toml")
+    assert back.sensors == twin.sensors
     assert back.build_dual_clutch(SHIFT) == twin.build_dual_clutch(SHIFT)
     assert back.parameters["te_delay"] == twin.parameters["te_delay"]
     assert back.covariance == pytest.approx(twin.covariance)

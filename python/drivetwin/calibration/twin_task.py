@@ -35,6 +35,7 @@ from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.simulation.shift_control import Sensors, SpeedSensor
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
 
 DEFAULT_LIMITS = {
@@ -50,6 +51,7 @@ class Request(CalibrationOptions):
     """Task of a calibration: gears and options, limits, spread between units, effort.
 
     `controller` is that of the policy `own`, `oil` the friction over the oil temperature.
+    `sensors` of `engine_speed` and `output_speed` take the place of those of the twin's log.
     `start` holds starting values and `bounds` bounds (SI) of the policy by name; `limits` None
     stands for those of the start.
     """
@@ -62,6 +64,7 @@ class Request(CalibrationOptions):
     start: Mapping[str, float] = field(default_factory=dict)
     settings: CalibrationSettings = field(default_factory=CalibrationSettings)
     controller: UserController | None = None
+    sensors: Mapping[str, SpeedSensor] = field(default_factory=dict)
     hardware: Hardware = field(default_factory=Hardware)
 
 
@@ -251,4 +254,15 @@ def _build_unit_draws(twin: Twin, maneuver: Maneuver, request: Request) -> UnitD
         )
     delay = twin.get_value(PRESSURE_DELAY, 0.0)
     old, new = (twin.actuators[name].delay(delay) for name in names)
-    return UnitDraws(old, new, request.engine_lag, request.spread)
+    sensors = _build_sensors(maneuver, {**twin.sensors, **request.sensors})
+    return UnitDraws(old, new, request.engine_lag, request.spread, sensors)
+
+
+def _build_sensors(maneuver: Maneuver, given: Mapping[str, SpeedSensor]) -> Sensors | None:
+    """Build the sensors of a controller; None where nothing is known of them."""
+    if not given:
+        return None
+    engine, output = (given.get(name, SpeedSensor()) for name in ("engine_speed", "output_speed"))
+    pair = maneuver.offgoing, maneuver.oncoming
+    off, on = ((1.0 / (maneuver.model.i_in * one.i_c), -one.i_out) for one in pair)
+    return Sensors(engine, output, (off, on))

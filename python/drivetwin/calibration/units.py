@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.calibration.spread import Spread
-from drivetwin.simulation.shift_control import ControlledUnit
+from drivetwin.simulation.shift_control import ControlledUnit, Sensors
 
 MakeActuators = Callable[[np.random.Generator], ControlledUnit]
 """Makes the actuators of a unit."""
@@ -27,13 +27,15 @@ _DEAD_TIMES = (0.25, 2.0)
 class UnitDraws:
     """Draws of actuators with identified values, and of the engine's lag [s] around `engine_lag`.
 
-    Parameters that the twin's log does not determine stay at their assumed values.
+    Parameters that the twin's log does not determine stay at their assumed values. Each unit has
+    the `sensors` with a noise of its own.
     """
 
     offgoing: IdentifiedActuator
     oncoming: IdentifiedActuator
     engine_lag: float
     spread: Spread
+    sensors: Sensors | None = None
 
     @property
     def nominal(self) -> ControlledUnit:
@@ -47,7 +49,14 @@ class UnitDraws:
             _draw_actuator(self.oncoming, random),
             self.engine_lag,
         )
-        return lambda random: scale_unit(identified, self.spread, random)
+
+        def make(random: np.random.Generator) -> ControlledUnit:
+            unit = scale_unit(identified, self.spread, random)
+            if self.sensors is None:
+                return unit
+            return replace(unit, sensors=replace(self.sensors, seed=int(random.integers(2**53))))
+
+        return make
 
 
 def scale_unit(unit: ControlledUnit, spread: Spread, random: np.random.Generator) -> ControlledUnit:

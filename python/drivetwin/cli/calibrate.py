@@ -171,6 +171,7 @@ def _build_request(
         spread=given.spread,
         oil=given.oil,
         hardware=given.hardware,
+        sensors=given.sensors,
         bounds=given.bounds,
         settings=replace(settings, starts=0) if logs and request.start else settings,
     )

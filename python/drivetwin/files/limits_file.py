@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, FiniteFloat
@@ -23,6 +23,7 @@ from drivetwin.calibration.stages import Stage
 from drivetwin.calibration.trial import Scenario, build_assertion_keys
 from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.files.records import Record, SchemaName, read_record
+from drivetwin.simulation.shift_control import SpeedSensor
 
 STAGES_SCHEMA = "drivetwin/calibration-stages-1"
 
@@ -123,12 +124,15 @@ class OilRecord(Record):
 
 
 class LimitsFile(Record):
-    """File of limits: upper bounds, spread between units, oil, hardware, bounds of parameters."""
+    """File of limits: upper bounds, spread, oil, hardware, sensors, bounds of parameters."""
 
     limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]]
     spread: Spread = Spread()
     oil: OilRecord = OilRecord()
     hardware: Hardware = Hardware()
+    sensors: dict[Literal["engine_speed", "output_speed"], SpeedSensor] = Field(
+        default_factory=dict
+    )
     bounds: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat]] = Field(default_factory=dict)
 
     def list_bounds(self) -> dict[str, tuple[float, float]]:
@@ -140,12 +144,13 @@ class LimitsFile(Record):
 
 @dataclass(frozen=True)
 class Requirements:
-    """Limits, spread, oil and hardware of a file, and bounds of the policy's parameters by name."""
+    """Limits, spread, oil, hardware and sensors of a file, and bounds of parameters by name."""
 
     limits: tuple[Limit, ...]
     spread: Spread = field(default_factory=Spread)
     oil: OilFriction = field(default_factory=OilFriction)
     hardware: Hardware = field(default_factory=Hardware)
+    sensors: Mapping[str, SpeedSensor] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
@@ -171,8 +176,14 @@ def load_limits(path: Path) -> Requirements:
     content = LimitsFile.model_validate(document)
     limits = tuple(Limit(keys[name][0], bound, keys[name][1])
                    for name, bound in content.limits.items())  # fmt: skip
-    drawn = content.spread, content.oil.to_friction()
-    return Requirements(limits, *drawn, content.hardware, content.list_bounds())
+    return Requirements(
+        limits=limits,
+        spread=content.spread,
+        oil=content.oil.to_friction(),
+        hardware=content.hardware,
+        sensors={str(name): one for name, one in content.sensors.items()},
+        bounds=content.list_bounds(),
+    )
 
 
 STOCK = Path(__file__).with_name("stock_scenarios.toml")

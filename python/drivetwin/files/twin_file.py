@@ -40,6 +40,7 @@ from drivetwin.files.records import (
 from drivetwin.files.tcu_twin_file import is_tcu_twin
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.added_elements import Converter
+from drivetwin.simulation.shift_control import SpeedSensor
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from drivetwin.vehicle.card import RATIO_TOLERANCE
 
@@ -124,6 +125,7 @@ class TwinFile(Record):
     load: LoadLaw | None = None
     covariance: CovarianceRecord | None = None
     actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
+    sensors: dict[str, SpeedSensor] = Field(default_factory=dict)
     validity: dict[str, Interval]
     inputs: dict[str, str]
     settings: dict[str, Any]
@@ -219,7 +221,7 @@ def _check_actuators(content: TwinFile) -> Iterator[Fault]:
 
 _TWIN_FIELDS = (
     *("version", "name", "method", "loss_law", "parameters", "friction", "validity", "inputs"),
-    *("settings", "assumptions", "actuators"),
+    *("settings", "assumptions", "actuators", "sensors"),
 )
 _GEARBOX_FIELDS = (
     *("i_in", "final_drive", "gears", "elements", "J_prime_range", "J_vehicle_range"),

@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from drivetwin._native import simulate_controlled as native_simulate_controlled
 from drivetwin.actuator.model import ActuatorModel
@@ -136,12 +137,43 @@ AnyController = ShiftController | ExternalController
 
 
 @dataclass(frozen=True)
+class SpeedSensor:
+    """Sensor of a speed: noise of a sample and rounding step [rad/s], sampling period, delay [s].
+
+    Without a period there is a sample at each task.
+    """
+
+    noise: Annotated[float, Field(ge=0, alias="noise_rad_s")] = 0.0
+    quantum: Annotated[float, Field(ge=0, alias="quantum_rad_s")] = 0.0
+    period: Annotated[float, Field(ge=0, le=1, alias="period_s")] = 0.0
+    delay: Annotated[float, Field(ge=0, le=1, alias="delay_s")] = 0.0
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Sensors of a made unit: of engine and gearbox input, and of the gearbox output.
+
+    `slips` are the factors of both speeds in the slips of the off-going and on-coming element,
+    which the controller computes. `seed` is that of noise and sampling instants.
+    """
+
+    engine: SpeedSensor
+    output: SpeedSensor
+    slips: tuple[tuple[float, float], tuple[float, float]]
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class ControlledUnit:
-    """Actuators of a made unit, and the time constant of its engine torque [s]."""
+    """Actuators of a made unit, the time constant of its engine torque [s], and its sensors.
+
+    Without sensors the controller has exact speeds.
+    """
 
     offgoing: ActuatorModel
     oncoming: ActuatorModel
     engine_lag: float
+    sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.engine_lag < float("inf"):

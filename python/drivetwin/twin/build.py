@@ -11,6 +11,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.read_options import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification
@@ -18,6 +19,7 @@ from drivetwin.estimation.result.estimate import FrictionCurve, LoadLaw
 from drivetwin.estimation.result.estimate_set import JointCovariance
 from drivetwin.estimation.result.verdict import from_prior
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
+from drivetwin.simulation.shift_control import SpeedSensor
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from drivetwin.vehicle.spec import PARTNER_LEVEL_STD
 
@@ -71,7 +73,20 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
         converter=card.converter,
         actuators=_collect_actuators(found, card),
         wheel_radius=None if card.wheel_radius is None else card.wheel_radius.value,
+        sensors=_describe_sensors(found),
     )
+
+
+def _describe_sensors(found: Identification) -> dict[str, SpeedSensor]:
+    """Sensors of the speeds in the log; empty for one that was not kept."""
+    signals, sensors = found.evidence.signals, {}
+    for name in ("engine_speed", "output_speed") if signals else ():
+        parts = [getattr(one, name) for one in signals]
+        quantum = min(estimate_rounding_step(one.values) for one in parts)
+        noise = np.mean([one.sigma**2 for one in parts]) - quantum**2 / 12.0
+        period = np.median(np.concatenate([np.diff(one.time) for one in parts]))
+        sensors[name] = SpeedSensor(float(max(noise, 0.0) ** 0.5), quantum, float(period))
+    return sensors
 
 
 def _collect_actuators(found: Identification, card: VehicleCard) -> dict[str, IdentifiedActuator]:

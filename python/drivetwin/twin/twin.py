@@ -35,6 +35,7 @@ from drivetwin.simulation.dual_clutch import (
     ShiftElement,
     Stribeck,
 )
+from drivetwin.simulation.shift_control import SpeedSensor
 from drivetwin.vehicle.ratio_card import ShiftKind
 from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue, move_clutch_ratios
 from drivetwin.vehicle.vehicle_card import VehicleCard
@@ -121,6 +122,7 @@ class Twin(DisplayMixin):
     `load_law` is the growth of the load torque with speed; None where it is constant. `converter`
     is the card's map of the torque converter, None where it has none. `actuators` are those of the
     elements, from commands in the log or from the card. `wheel_radius` [m] is that of the card.
+    `sensors` are those of `engine_speed` and `output_speed` in the log, without their delay.
     """
 
     name: str
@@ -146,6 +148,7 @@ class Twin(DisplayMixin):
     converter: Converter | None = None
     actuators: Mapping[str, IdentifiedActuator] = field(default_factory=dict)
     wheel_radius: float | None = None
+    sensors: Mapping[str, SpeedSensor] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         gears = ", ".join(self.gears)

@@ -3,6 +3,7 @@
 
 use super::actuator::{Actuator, ActuatorModel};
 use super::controller::{Commands, Controller, Measured, RunningController};
+use super::sensors::{Sensing, Sensors};
 use serde::{Deserialize, Serialize};
 
 /// Actuators of a made unit.
@@ -15,6 +16,8 @@ pub struct ControlledUnit {
     pub oncoming: ActuatorModel,
     /// Time constant of the engine torque, s; none for an immediate one.
     pub engine_lag: f64,
+    /// Sensors of the speeds that the controller has; none for exact speeds.
+    pub sensors: Option<Sensors>,
 }
 
 /// Controller, actuators and engine in motion.
@@ -22,6 +25,7 @@ pub struct Drive<'c> {
     controller: Box<dyn RunningController + 'c>,
     offgoing: Actuator,
     oncoming: Actuator,
+    sensing: Option<Sensing>,
     engine_lag: f64,
     engine_torque: f64,
     time: f64,
@@ -36,6 +40,7 @@ impl<'c> Drive<'c> {
             controller,
             offgoing: Actuator::new(&unit.offgoing, offgoing, time, step),
             oncoming: Actuator::new(&unit.oncoming, oncoming, time, step),
+            sensing: unit.sensors.map(Sensing::new),
             engine_lag: unit.engine_lag,
             engine_torque,
             time,
@@ -44,7 +49,8 @@ impl<'c> Drive<'c> {
 
     /// Let the controller command by the quantities at the present time.
     pub fn command(&mut self, measured: &Measured) -> Commands {
-        let commands = self.controller.step(self.time, measured);
+        let sensed = self.sensing.as_mut().map(|one| one.sense(self.time, measured));
+        let commands = self.controller.step(self.time, sensed.as_ref().unwrap_or(measured));
         self.offgoing.command(commands.offgoing);
         self.oncoming.command(commands.oncoming);
         commands
