@@ -30,6 +30,7 @@ from drivetwin.tcu.card import ControllerCardFile, make_card
 from drivetwin.tcu.identify import TcuTwin
 from drivetwin.tcu.problem import RowNoise
 from drivetwin.tcu.synthesize import CARD, format_card
+from drivetwin.tcu.unknowns import Own
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from tests.report import sample
@@ -56,7 +57,7 @@ def twin() -> Twin:
 def make_tcu_twin() -> TcuTwin:
     card = make_card(ControllerCardFile.model_validate(CARD))
     noise = RowNoise({"engine_speed": 0.1}, {"engine_speed": 9.0})
-    return TcuTwin(card, ("J_engine",), np.zeros(1), np.eye(1), noise, ("1-2",))
+    return TcuTwin(card, ("J_engine",), np.zeros(1), np.eye(1), noise, ("1-2",), {Own.FILL: 0.5})
 
 
 def elements() -> list[dict[str, Any]]:

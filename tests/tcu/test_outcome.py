@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.cli import main
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.files.twin_file import load_twin
 from drivetwin.tcu.card import load_controller_card
 from drivetwin.tcu.log import read_controller_log
 from drivetwin.tcu.plant import build_term
 from drivetwin.tcu.problem import build_problem
 from drivetwin.tcu.synthesize import make_log
+from drivetwin.twin.twin import build_nominal_shift
+from tests.calibration.cases import QUICK
 
 SHIFTS = 9
 BESIDE = {"torque_delay": ("torque_dead_time", "torque_lag")}
@@ -42,9 +46,14 @@ def read_result(folder: Path) -> dict[str, Any]:
     return found
 
 
+def read_truth(folder: Path) -> dict[str, float]:
+    found: dict[str, float] = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    return found
+
+
 def test_stated_values_contain_the_truth(made: Path) -> None:
     found = read_result(made / "out")["parameters"]
-    truth = json.loads((made / "truth.json").read_text(encoding="utf-8"))
+    truth = read_truth(made)
     names = {name: BESIDE.get(name, (name,)) for name in found}
     known = {
         name: sum(truth[one] for one in of) * (1e5 if name.endswith(".P0") else 1.0)
@@ -59,6 +68,31 @@ def test_stated_values_contain_the_truth(made: Path) -> None:
     known_scale = truth["torque_scale"] / truth["J_vehicle"]
     assert found["torque_scale/J_vehicle"]["value"] == pytest.approx(known_scale, rel=0.1)
     assert found["torque_scale/J_vehicle"]["verdict"] == "identified"
+
+
+def test_the_twin_of_a_kind_of_shift_is_exported_and_calibrated(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(CalibrationSettings, "for_policy", lambda _: QUICK)
+    source, truth = made / "out" / "shift_2-3.toml", read_truth(made)
+    twin = load_twin(source)
+    model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))
+    card = load_controller_card(made / "card.toml")
+    held = [model.get_overall_ratio(one.name) for one in model.elements]
+    assert held == pytest.approx([card.ratios["2"], card.ratios["3"]])
+    oncoming = model.elements[1]
+    lever = card.levers[frozenset(("2", "3"))][oncoming.name]
+    assert oncoming.i_c == pytest.approx(1.0 / lever)
+    kiss = 1e5 * truth[f"{oncoming.name}.P0"]
+    assert pytest.approx(kiss, rel=0.1) == oncoming.P0
+    torque = oncoming.gain * oncoming.friction.evaluate(np.array([50.0]))[0] * 1e5
+    friction = 1.0 + 50.0 * truth[f"{oncoming.name}.slope"]
+    assert torque == pytest.approx(truth[f"{oncoming.name}.gain"] * friction, rel=0.1)
+    assert twin.covariance is not None
+    assert np.linalg.eigvalsh(twin.covariance)[0] > -1e-6 * np.trace(twin.covariance)
+    assert main(["export", str(source), "--to", "c", "-o", str(tmp_path / "c")]) == 0
+    command = ["calibrate", str(source), "--shift", "2-3", "-o", str(tmp_path / "cal")]
+    assert main([*command, "--draws", "60"]) == 0
 
 
 @pytest.mark.parametrize("number", ["drop", "dead_time", "fill_time"])

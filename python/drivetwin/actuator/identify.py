@@ -44,6 +44,8 @@ class ActuatorSource(StrEnum):
     """Measured pressure of the clutch."""
     TORQUE = "torque"
     """Torque of the clutch, by the balance of the torques of the driveline."""
+    SPEEDS = "speeds"
+    """Speeds in the log of a gearbox control."""
     CARD = "card"
     """Design values of the vehicle card."""
 

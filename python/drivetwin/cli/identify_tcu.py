@@ -78,13 +78,19 @@ def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, .
     """Write result, twin and report into `folder`, all or none; return their paths."""
     from drivetwin.cli.output import write_atomically
     from drivetwin.files.tcu_twin_file import save_tcu_twin
+    from drivetwin.files.twin_file import save_twin
     from drivetwin.report.tcu import render_tcu
+    from drivetwin.twin.of_controller import build_shift_twin
 
+    kinds = found.twin.kinds if found.status.is_confirmed else ()
+    twins = {f"shift_{kind}.toml": build_shift_twin(found.found, kind) for kind in kinds}
     with write_atomically(folder) as beside:
         save_tcu_twin(beside / TWIN, found.twin)
+        for name, twin in twins.items():
+            save_twin(beside / name, twin)
         for name, text in {TCU_RESULT: result, REPORT: render_tcu(found)}.items():
             (beside / name).write_text(text, encoding="utf-8", newline="\n")
-    return tuple(folder / name for name in (TCU_RESULT, TWIN, REPORT))
+    return tuple(folder / name for name in (TCU_RESULT, TWIN, REPORT, *twins))
 
 
 def find_controller_twin(source: Path) -> Path | None:

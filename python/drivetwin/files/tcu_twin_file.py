@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, FiniteFloat, model_validator
@@ -28,6 +28,7 @@ from drivetwin.tcu.log import SPEEDS
 from drivetwin.tcu.outcome import TcuIdentification
 from drivetwin.tcu.predict import PredictedShift
 from drivetwin.tcu.problem import RowNoise
+from drivetwin.tcu.unknowns import Own
 
 TCU_SCHEMA = "drivetwin/tcu-1"
 
@@ -121,7 +122,10 @@ class NoiseRecord(Record):
 
 
 class TcuTwinFile(Record):
-    """The whole of the file: card, coordinates of the shared numbers, covariance row by row."""
+    """The whole of the file: card, coordinates of the shared numbers, covariance row by row.
+
+    `sizes` are deviations of numbers that vary from shift to shift, over the usual ones.
+    """
 
     schema_name: SchemaName = TCU_TWIN_SCHEMA
     version: str
@@ -130,6 +134,7 @@ class TcuTwinFile(Record):
     coordinates: list[FiniteFloat]
     covariance: list[list[FiniteFloat]]
     noise: dict[str, NoiseRecord]
+    sizes: dict[Own, Annotated[FiniteFloat, Field(gt=0)]] = Field(default_factory=dict)
     card: ControllerCardFile
 
     @model_validator(mode="after")
@@ -166,6 +171,7 @@ def format_tcu_twin(twin: TcuTwin) -> TcuTwinFile:
             name: NoiseRecord(sigma=one, repeats=noise.repeats[name])
             for name, one in noise.sigma.items()
         },
+        sizes=dict(twin.sizes),
         card=twin.card.file,
     )
 
@@ -187,4 +193,5 @@ def load_tcu_twin(path: Path | str) -> TcuTwin:
         np.array(content.covariance),
         RowNoise(sigma, repeats),
         tuple(content.kinds),
+        content.sizes,
     )

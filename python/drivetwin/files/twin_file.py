@@ -140,9 +140,9 @@ def read_twin_file(path: Path | str) -> TwinFile:
     """
     if is_tcu_twin(path):
         raise ResultFileError(
-            "this twin is of a gearbox with converter, from the log of its control; this command "
-            "takes twins of a driveline with measured pressures",
-            "simulate it: 'drivetwin simulate TWIN LOG'",
+            "this twin is of all shifts of a gearbox with converter, from the log of its control",
+            "give the file shift_GEAR-GEAR.toml beside it, the twin of one kind of shift, or "
+            "simulate this one: 'drivetwin simulate TWIN LOG'",
             Where(file=str(path)),
         )
     content = read_record(path, parse_toml, TWIN_SCHEMA, TwinFile)

@@ -52,9 +52,9 @@ _NO_TWIN = {
         ", or ssv, cdfx, dcm, m, writes its values",
     ),
     TcuFile: (
-        "the twin from the log of a gearbox control has commands as inputs, and a converter",
-        "'drivetwin simulate' predicts shifts with it; 'drivetwin export RESULT --to csv', or ssv, "
-        "cdfx, dcm, m, writes its values",
+        "the twin from the log of a gearbox control is of all shifts, with a converter",
+        "give the file shift_GEAR-GEAR.toml in its folder, the twin of one kind of shift; "
+        "'drivetwin export RESULT --to csv', or ssv, cdfx, dcm, m, writes the values",
     ),
 }
 """Reason and remedy where a result cannot have a twin."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,8 +21,10 @@ from drivetwin.tcu.problem import (
     RowNoise,
     build_problem,
     estimate_noise,
+    estimate_sizes,
     weigh,
 )
+from drivetwin.tcu.unknowns import Own
 
 _LOOSE = GaussNewtonSettings(rough_max_iter=10, rough_rtol=1e-2, bend_ratio=0.75)
 _TIGHT = GaussNewtonSettings(ftol=0.1, kink_ftol=1.0, max_iter=8, bend_ratio=0.75)
@@ -38,7 +40,8 @@ _LEAST_STEP = 0.02
 @dataclass(frozen=True, eq=False)
 class TcuTwin:
     """Plant of a gearbox with converter: the card, and the coordinates `values` (p,) of the shared
-    numbers `names` with their `covariance` (p, p); the noise of rows; kinds of shifts fitted."""
+    numbers `names` with their `covariance` (p, p); the noise of rows; kinds of shifts fitted;
+    `sizes` of the numbers that vary from shift to shift, over their stated deviations."""
 
     card: ControllerCard
     names: tuple[str, ...]
@@ -46,6 +49,7 @@ class TcuTwin:
     covariance: FloatArray
     noise: RowNoise
     kinds: tuple[str, ...]
+    sizes: Mapping[Own, float]
 
     def get_place(self, name: str) -> int:
         """Return the place of a shared number."""
@@ -63,6 +67,7 @@ class FittedShifts:
     point: ParameterVector
     covariance: FloatArray
     noise: RowNoise
+    sizes: Mapping[Own, float]
 
     @property
     def twin(self) -> TcuTwin:
@@ -76,28 +81,40 @@ class FittedShifts:
             self.covariance[np.ix_(places, places)],
             self.noise,
             tuple(dict.fromkeys(one.kind for one in self.shifts)),
+            self.sizes,
         )
 
 
 def fit_shifts(card: ControllerCard, shifts: Sequence[ControllerShift]) -> FittedShifts:
     """Fit the numbers of vehicle and clutches to shifts: loose first, then by the residuals.
 
+    The search starts with the first shift of each kind, in which all shared numbers act.
+
     Raises IdentificationError where the simulation cannot be brought onto the log.
     """
     problem, point, coordinates = build_problem(card, shifts)
-    problem = weigh(problem, LOOSE, point)
-    found = _require(minimise(problem, point, rough=True, settings=_LOOSE))
-    noise = LOOSE
-    for _ in range(_ROUNDS):
+    first = {one.kind: k for k, one in reversed(list(enumerate(shifts)))}
+    for some in ([problem.terms[k] for k in first.values()], problem.terms):
+        problem = weigh(replace(problem, terms=tuple(some)), LOOSE, point)
+        found = _require(minimise(problem, point, rough=True, settings=_LOOSE))
+        point = found.point
+    for turn in range(_ROUNDS):
         point = found.point
         noise = estimate_noise(found.problem, point)
-        spread = np.sqrt(np.diag(np.linalg.inv(found.normal.information)))
+        covariance = _invert(found)
+        spread = np.sqrt(np.diag(covariance))
         problem = _widen_steps(weigh(found.problem, noise, point), coordinates, spread)
+        sizes = estimate_sizes(coordinates, point, covariance) if turn else {}
+        problem = replace(problem, prior=coordinates.resize(sizes).prior)
         found = _require(minimise(problem, point, settings=_TIGHT))
-    covariance = np.asarray(np.linalg.inv(found.normal.information), dtype=np.float64)
     return FittedShifts(
-        card, tuple(shifts), found.problem, coordinates, found.point, covariance, noise
+        card, tuple(shifts), found.problem, coordinates, found.point, _invert(found), noise, sizes
     )
+
+
+def _invert(found: OptimizeResult[DrivenProblem]) -> FloatArray:
+    """Return the covariance (p, p) at a minimum."""
+    return np.asarray(np.linalg.inv(found.normal.information), dtype=np.float64)
 
 
 def _require(found: OptimizeResult[DrivenProblem] | None) -> OptimizeResult[DrivenProblem]:

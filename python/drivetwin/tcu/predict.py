@@ -18,7 +18,7 @@ from drivetwin.fit.driven_term import DrivenProblem
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.identify import TcuTwin
 from drivetwin.tcu.log import SPEEDS, ControllerShift
-from drivetwin.tcu.problem import build_problem, weigh
+from drivetwin.tcu.problem import build_problem
 
 DRAWS = 60
 """Draws of the numbers from which a band is formed [count]."""
@@ -85,7 +85,7 @@ def predict_shift(
 
     Raises IdentificationError where the shift cannot be simulated.
     """
-    problem, point, _ = build_problem(twin.card, [shift])
+    problem, point, _ = build_problem(twin.card, [shift], twin.sizes)
     shared = [name for name in point.names if name in set(twin.names)]
     places = [point.names.index(name) for name in shared]
     fitted = [twin.get_place(name) for name in shared]
@@ -100,11 +100,24 @@ def predict_shift(
             f"{shift.name} cannot be simulated with the numbers of the fit",
             "check that the shift is one of the same vehicle and of a kind that was fitted",
         )
-    own = np.setdiff1d(np.arange(len(point.names)), places)
-    inverse = np.linalg.inv(start.normal.information)
-    joint = covariance.copy()
-    joint[np.ix_(own, own)] = inverse[np.ix_(own, own)]
+    joint = _add_own(covariance, start.normal.information, places)
     return _draw(twin, problem, start.point, joint, shift, rng)
+
+
+def _add_own(covariance: FloatArray, information: FloatArray, places: list[int]) -> FloatArray:
+    """Return the covariance (p, p) with that of the numbers of the shift, given its rows.
+
+    They move with the numbers of the fit, so that the rows stay met: load with the torque scale.
+    """
+    shared = np.array(places)
+    own = np.setdiff1d(np.arange(len(information)), shared)
+    given = np.linalg.inv(information[np.ix_(own, own)])
+    follow = -given @ information[np.ix_(own, shared)]
+    joint, fitted = covariance.copy(), covariance[np.ix_(shared, shared)]
+    joint[np.ix_(own, shared)] = follow @ fitted
+    joint[np.ix_(shared, own)] = joint[np.ix_(own, shared)].T
+    joint[np.ix_(own, own)] = given + follow @ fitted @ follow.T
+    return joint
 
 
 def _join_covariance(
@@ -133,8 +146,8 @@ def _hold(
 def _cut(problem: DrivenProblem, shift: ControllerShift, twin: TcuTwin) -> DrivenProblem:
     """Compare the rows before the change of the commanded gear alone."""
     (term,) = problem.terms
-    term = replace(term, record=term.record.cut(shift.change))
-    return weigh(replace(problem, terms=(term,)), twin.noise, None)
+    term = replace(term, record=term.record.cut(shift.change)).weigh(twin.noise.own)
+    return replace(problem, terms=(term,))
 
 
 def _draw(
@@ -145,7 +158,10 @@ def _draw(
     shift: ControllerShift,
     rng: np.random.Generator,
 ) -> PredictedShift:
-    """Simulate the shift at a point and at draws about it."""
+    """Simulate the shift at a point and at draws about it.
+
+    Both ends of a measured duration are rounded to rows.
+    """
     values, directions = np.linalg.eigh(covariance)
     root = directions * np.sqrt(np.maximum(values, 0.0))
     speeds, times = _simulate(problem, point, twin.card, shift)
@@ -160,16 +176,27 @@ def _draw(
         drawn.append(there)
         durations.append(when.duration)
     sigma = np.array([twin.noise.sigma[name] for name in SPEEDS])
-    spread = np.std(drawn, axis=0) if drawn else np.full(shift.speeds.shape, np.nan)
+    spread = _find_reach(np.array(drawn), speeds)
     known = np.array(durations)[np.isfinite(durations)]
+    rounding = float(np.median(np.diff(shift.time))) / np.sqrt(6.0)
     return PredictedShift(
         shift,
         speeds,
-        Z95 * np.hypot(spread, sigma),
+        np.hypot(spread, Z95 * sigma),
         times,
-        Z95 * float(np.std(known)) if known.size > 1 else float("nan"),
+        float(np.hypot(_find_reach(known, times.duration), Z95 * rounding)),
         find_slip(twin.card, shift, shift.time, shift.speeds[:, 1], shift.speeds[:, 2]),
     )
+
+
+def _find_reach(drawn: FloatArray, about: FloatArray | float) -> FloatArray:
+    """Find the distance (...) from `about` within which 95 % of draws (count, ...) are.
+
+    By their quantiles: where a slip begins early in some draws, deviations have long tails.
+    """
+    if not drawn.size:
+        return np.full(np.shape(about), np.nan)
+    return np.asarray(np.quantile(np.abs(drawn - about), 0.95, axis=0, method="weibull"))
 
 
 def _simulate(

@@ -17,7 +17,7 @@ from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.log import SPEEDS, ControllerShift
 from drivetwin.tcu.plant import build_term
-from drivetwin.tcu.unknowns import J_VEHICLE, Stated
+from drivetwin.tcu.unknowns import J_VEHICLE, Own, Stated, find_own
 
 _REACH = 2.0
 """Largest change of a number in one step of the search [standard deviations of its prior]."""
@@ -49,6 +49,12 @@ class Coordinates:
         weight = self.spread**-2.0
         return Prior(self.mean, self.to_absolute.T @ (weight[:, None] * self.to_absolute))
 
+    def resize(self, sizes: Mapping[Own, float]) -> Coordinates:
+        """Multiply the deviations of numbers of a shift by `sizes`."""
+        kinds = [find_own(name) for name in self.names]
+        factors = [1.0 if one is None else sizes.get(one, 1.0) for one in kinds]
+        return replace(self, spread=self.spread * factors)
+
     def get_shared(self) -> list[str]:
         """Return the names of numbers of no single shift."""
         return [name for name in self.names if not name.startswith("shift ")]
@@ -68,9 +74,14 @@ class Coordinates:
 
 
 def build_problem(
-    card: ControllerCard, shifts: Sequence[ControllerShift]
+    card: ControllerCard,
+    shifts: Sequence[ControllerShift],
+    sizes: Mapping[Own, float] | None = None,
 ) -> tuple[DrivenProblem, ParameterVector, Coordinates]:
-    """Build the likelihood of shifts, its first point and its coordinates."""
+    """Build the likelihood of shifts, its first point and its coordinates.
+
+    `sizes` are factors of the stated deviations of numbers of a shift.
+    """
     terms, numbers, stated = [], {}, {}
     for shift in shifts:
         term, there = build_term(card, shift)
@@ -88,6 +99,7 @@ def build_problem(
     grows = [k for k, name in enumerate(names) if stated[name].scaled and stated[name].is_positive]
     to_absolute[grows, names.index(J_VEHICLE)] = 1.0
     coordinates = Coordinates(tuple(numbers.values()), stated, names, mean, spread, to_absolute)
+    coordinates = coordinates.resize(sizes or {})
     limits = [(-np.inf, np.inf) if one is None else one.limits for one in sought]
     lower, upper = np.array(limits).T
     problem = DrivenProblem(tuple(terms), coordinates.prior, lower, upper, _REACH * spread)
@@ -103,9 +115,14 @@ class RowNoise:
     repeats: Mapping[str, float]
 
     @property
-    def weights(self) -> dict[str, float]:
+    def own(self) -> dict[str, float]:
         """Standard deviation of a row that counts as independent, by output."""
         return {name: one * float(np.sqrt(self.repeats[name])) for name, one in self.sigma.items()}
+
+    @property
+    def shared(self) -> dict[str, float]:
+        """Standard deviation of a row for numbers of all shifts, by output: with errors of laws."""
+        return {name: max(one, FLOOR * np.sqrt(_FLOOR_REPEATS)) for name, one in self.own.items()}
 
 
 LOOSE = RowNoise(
@@ -122,9 +139,9 @@ _LAGS, _UNCORRELATED = 40, 0.05
 """Rows over which a residual is correlated at most, and the correlation that counts as none."""
 
 
-def weigh(problem: DrivenProblem, noise: RowNoise, point: ParameterVector | None) -> DrivenProblem:
-    """Weigh all rows by the noise; about a point, those far off weigh less."""
-    terms = tuple(one.weigh(noise.weights, point) for one in problem.terms)
+def weigh(problem: DrivenProblem, noise: RowNoise, point: ParameterVector) -> DrivenProblem:
+    """Weigh the rows of all shifts by the noise; about a point, those far off weigh less."""
+    terms = tuple(one.weigh(noise.shared, point) for one in problem.terms)
     return replace(problem, terms=terms)
 
 
@@ -143,9 +160,42 @@ def estimate_noise(problem: DrivenProblem, point: ParameterVector) -> RowNoise:
     for name, parts in residuals.items():
         size = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
         sigma[name] = max(size, _LEAST_SIGMA)
-        least = (FLOOR / sigma[name]) ** 2 * _FLOOR_REPEATS
-        repeats[name] = max(_count_repeats(parts), least)
+        repeats[name] = _count_repeats(parts)
     return RowNoise(sigma, repeats)
+
+
+_VARYING = ((Own.OFFSET,), (Own.GAIN_OFF, Own.GAIN_ON), (Own.FILL,), (Own.RATE,))
+"""Numbers of a shift by errors of one kind, whose size the shifts themselves show."""
+_SIZES = np.geomspace(0.01, 10.0, 61)
+"""Sizes that are weighed, over the stated deviation: a hundredth of it acts on no row."""
+_SIZE_SPREAD = 1.0
+"""Deviation of the logarithm of a size over vehicles, whose root mean square is the stated
+deviation."""
+
+
+def estimate_sizes(
+    coordinates: Coordinates, point: ParameterVector, covariance: FloatArray
+) -> dict[Own, float]:
+    """Estimate the deviations of the numbers that vary from shift to shift, over the stated ones.
+
+    A size is the root of the mean square of its distribution, given the values (p,) at the
+    minimum and their `covariance` (p, p). Without information it is 1.
+    """
+    apart = (point.values - coordinates.mean) / coordinates.spread
+    share = np.clip(np.diag(covariance) / coordinates.spread**2, 1e-6, 1.0 - 1e-6)
+    kinds = [find_own(name) for name in coordinates.names]
+    found = {}
+    for group in _VARYING:
+        places = [k for k, kind in enumerate(kinds) if kind in group]
+        own = share[places] / (1.0 - share[places])
+        seen = apart[places] / (1.0 - share[places])
+        variance = own + _SIZES[:, None] ** 2
+        score = np.sum(np.log(variance) + seen**2 / variance, axis=1)
+        score += (np.log(_SIZES) / _SIZE_SPREAD + _SIZE_SPREAD) ** 2
+        odds = np.exp(-0.5 * (score - score.min()))
+        size = float(np.sqrt(odds @ _SIZES**2 / odds.sum()))
+        found.update(dict.fromkeys(group, size))
+    return found
 
 
 def _count_repeats(parts: Sequence[FloatArray]) -> float:

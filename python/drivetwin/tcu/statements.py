@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -68,10 +68,11 @@ class Statement:
 
 def state(found: FittedShifts) -> dict[str, Estimate]:
     """Estimate the quantities of vehicle and elements with verdicts, by name."""
-    estimates = {}
-    values, aside = found.coordinates.to_values(found.point.values), _step_aside(found)
-    for one in (*_list_vehicle(), *_list_elements(found)):
-        estimates[one.name] = _judge(found, one, values, aside)
+    slopes = Slopes.from_fit(found)
+    estimates = {
+        one.name: assess_quantity(found, slopes, one.name, one.compute, one.spec)
+        for one in (*_list_vehicle(), *_list_elements(found))
+    }
     reasons = {"J_drum": _DRUM, "shaft_stiffness": _STIFFNESS, "shaft_damping": _DAMPING}
     for element in list_used(found.shifts):
         reasons |= {f"{element}.{number}": text for number, text in _WITHHELD.items()}
@@ -87,7 +88,7 @@ def list_used(shifts: tuple[ControllerShift, ...]) -> list[str]:
     return sorted({name for one in shifts for name in (one.off, one.on)})
 
 
-def _take(name: str, factor: float = 1.0) -> Quantity:
+def take(name: str, factor: float = 1.0) -> Quantity:
     """Return the function that takes a number, times a factor."""
     return lambda given: factor * given[name]
 
@@ -119,8 +120,8 @@ _SCALE_FREE = "independent of the common scale of all torques"
 def _list_vehicle() -> Iterator[Statement]:
     """List the quantities of the vehicle."""
     for name, (unit, meaning) in _VEHICLE.items():
-        yield Statement(name, unit, meaning, _take(name))
-    scale, engine = _relate(_take("torque_scale")), _relate(_take("J_engine"))
+        yield Statement(name, unit, meaning, take(name))
+    scale, engine = _relate(take("torque_scale")), _relate(take("J_engine"))
     yield Statement("torque_scale/J_vehicle", "1/(kg*m^2)", _SCALE_FREE, scale)
     yield Statement("J_engine/J_vehicle", "1", _SCALE_FREE, engine)
     delay = _add("torque_dead_time", "torque_lag")
@@ -136,7 +137,7 @@ def _list_elements(found: FittedShifts) -> Iterator[Statement]:
             f"{name}.P0",
             "Pa",
             "pressure at which the clutch begins to transmit",
-            _take(f"{name}.{Numbers.P0}", bar),
+            take(f"{name}.{Numbers.P0}", bar),
         )
         yield Statement(
             f"{name}.delay",
@@ -148,7 +149,7 @@ def _list_elements(found: FittedShifts) -> Iterator[Statement]:
             f"{name}.slope",
             "s/rad",
             "change of the friction with the slip, relative",
-            _take(f"{name}.{Numbers.SLOPE}"),
+            take(f"{name}.{Numbers.SLOPE}"),
         )
         meaning = f"torque of the element at {at:.2f} bar and 60 °C"
         yield Statement(f"{name}.capacity", "N*m", meaning, torque)
@@ -210,25 +211,49 @@ def find_onset(time: FloatArray, excess: FloatArray) -> float:
     return float(time[k - 1] + share * (time[k] - time[k - 1]))
 
 
-def _judge(
-    found: FittedShifts, one: Statement, values: Values, aside: list[tuple[Values, Values]]
-) -> Estimate:
-    """Judge a quantity by its standard deviation and by that of its priors.
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Numbers `values` at a minimum, and those a step above and below along each coordinate.
 
-    `aside` are the numbers a step above and below along each coordinate.
+    `steps` (p,) are the steps, `covariance` (p, p) is that of the coordinates.
     """
-    steps = _STEP * np.sqrt(np.diag(found.covariance))
-    ends = np.array([[one.compute(side) for side in sides] for sides in aside])
-    slopes = (ends[:, 0] - ends[:, 1]) / (2.0 * steps)
-    value = one.compute(values)
-    std = math.sqrt(max(float(slopes @ found.covariance @ slopes), 0.0))
+
+    values: Values
+    aside: Sequence[tuple[Values, Values]]
+    steps: FloatArray
+    covariance: FloatArray
+
+    @classmethod
+    def from_fit(cls, found: FittedShifts) -> Slopes:
+        """Step aside from the minimum of a fit."""
+        to_values, point = found.coordinates.to_values, found.point.values
+        steps = _STEP * np.sqrt(np.diag(found.covariance))
+        aside = [(to_values(point + one), to_values(point - one)) for one in np.diag(steps)]
+        return cls(to_values(point), aside, steps, found.covariance)
+
+    def differentiate(self, quantities: Sequence[Quantity]) -> FloatArray:
+        """Compute the derivatives (q, p) of quantities by the coordinates."""
+        ends = np.array([[[one(x) for x in sides] for sides in self.aside] for one in quantities])
+        return np.asarray((ends[:, :, 0] - ends[:, :, 1]) / (2.0 * self.steps))
+
+    def compute_covariance(self, quantities: Sequence[Quantity]) -> FloatArray:
+        """Compute the covariance (q, q) of quantities."""
+        rows = self.differentiate(quantities)
+        return np.asarray(rows @ self.covariance @ rows.T)
+
+
+def assess_quantity(
+    found: FittedShifts,
+    slopes: Slopes,
+    name: str,
+    quantity: Quantity,
+    declared: ParameterSpec | None = None,
+) -> Estimate:
+    """Assess a quantity by its standard deviation and by that of its priors."""
+    row = slopes.differentiate([quantity])[0]
+    value = quantity(slopes.values)
     wide = np.linalg.inv(found.coordinates.prior.precision)
-    prior = PriorValue(value, math.sqrt(max(float(slopes @ wide @ slopes), 0.0)))
-    return assess_with_prior((one.name, value, std), prior, METHOD, declared=one.spec)
-
-
-def _step_aside(found: FittedShifts) -> list[tuple[Values, Values]]:
-    """Compute the numbers a small step above and below along each coordinate."""
-    to_values, point = found.coordinates.to_values, found.point.values
-    steps = np.diag(_STEP * np.sqrt(np.diag(found.covariance)))
-    return [(to_values(point + step), to_values(point - step)) for step in steps]
+    std, before = (math.sqrt(max(float(row @ c @ row), 0.0)) for c in (slopes.covariance, wide))
+    return assess_with_prior(
+        (name, value, std), PriorValue(value, before), METHOD, declared=declared
+    )

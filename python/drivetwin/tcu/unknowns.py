@@ -48,6 +48,12 @@ class Own(StrEnum):
     FILL = "fill"
 
 
+def find_own(name: str) -> Own | None:
+    """Find the kind of a number of one shift by its name, None for a shared number."""
+    head, _, number = name.partition(".")
+    return Own(number) if head.startswith("shift ") else None
+
+
 @dataclass(frozen=True)
 class Stated:
     """Number with its prior: `std` relative where the number is positive by its law.

@@ -359,6 +359,8 @@ def _build_table(name: str, one: IdentifiedActuator) -> TableBlock:
     if one.source is ActuatorSource.TORQUE:
         caption = f"Actuator of {name}, from command and clutch torque: {one.samples} values, "
         caption += f"residual {one.rms:.2g} times the noise; usual ranges are priors"
+    elif one.source is ActuatorSource.SPEEDS:
+        caption = f"Actuator of {name}, from command and speeds"
     else:
         rms = format_with_unit(one.rms, "Pa", digits=3)
         caption = f"Actuator of {name}: {one.samples} samples, residual {rms} rms"
