@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import Calibration, Task, calibrate
+from drivetwin.calibration.lower_bound import compute_lower_bound
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
 from drivetwin.calibration.policies.kind import PolicyKind
@@ -45,6 +46,20 @@ def test_improves_on_fresh_draws_and_repeats_itself(found: Calibration) -> None:
     assert np.array_equal(found.after.values, again.after.values)
     assert found.after.certificate.limits[0].value <= 0.95
     assert found.runs == again.runs > 0
+
+
+def test_no_draw_is_below_the_bound_of_a_steady_change_of_acceleration(found: Calibration) -> None:
+    """The best relaxed shift changes the acceleration evenly from request to lock-up."""
+    shift = found.task.maneuver
+    old, new = (shift.compute_acceleration(1400.0, ratio) for ratio in shift.ratios)
+    change = shift.wheel_radius / shift.model.i_f * abs(old - new)
+    assert found.bound is not None
+    assert found.bound == pytest.approx(change / 0.95, rel=0.02)
+    assert found.bound < found.after.outcome.values[Metric.PEAK_JERK].min()
+    no_time = [Limit(Metric.SHIFT_TIME, 0.3), Limit(Metric.TORQUE_REDUCTION, 10.0)]
+    later = compute_lower_bound(shift, no_time)
+    assert later is not None
+    assert later > 2.0 * found.bound
 
 
 @pytest.mark.parametrize("kind", [PolicyKind.CONTROLLER, PolicyKind.KNOTS])

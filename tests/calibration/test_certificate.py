@@ -75,13 +75,15 @@ def test_the_promise_of_normal_stages_is_the_quantile_of_their_sum() -> None:
     types = np.repeat(random.normal(0.0, between, TYPE_COUNT), UNIT_COUNT)
     units, idle = random.normal(0.0, within, (2, types.size))
     sets = {"J1.inertia": types, "B2.gain": units, "B3.gain": idle, "start.engine": types + units}
+    sets |= {"J_v.inertia": 2.0 * types}  # goes with J1: neither alone explains anything
     scenarios = Scenarios(sets, types.size)
     found = compute_promise(make_outcome(50.0 + types + units), scenarios, TYPE_COUNT, 0.9)
     expected = 50.0 + within * norm.ppf(0.95) + between * norm.ppf(0.9)
     assert found.levels[JERK] == pytest.approx(expected, abs=0.4)  # 4 standard errors
     share = between**2 / (between**2 + within**2)
     stages = ("uncertainty of identified values", "production scatter")
-    expected_shares = {stages[0]: share, "J1": share, "B2": 1.0 - share, "B3": 0.0}
+    expected_shares = {stages[0]: share, "J1": 0.0, "J_v": 0.0, "several together": share}
+    expected_shares |= {"B2": 1.0 - share, "B3": 0.0}
     for name, value in expected_shares.items():
         assert found.shares[name] == pytest.approx(value, abs=0.05), name
     assert sum(found.shares[one] for one in stages) == pytest.approx(1.0)

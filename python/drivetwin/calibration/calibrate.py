@@ -17,6 +17,7 @@ from drivetwin._util.progress import TimedStages
 from drivetwin.calibration.certificate import Certificate, certify
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.keep_limits import TOLERANCE, Repair
+from drivetwin.calibration.lower_bound import compute_lower_bound
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
@@ -75,7 +76,8 @@ class Assessment:
 class Calibration:
     """Result: the calibration before and after, both on the fresh draws.
 
-    `runs` counts the simulated shifts.
+    `runs` counts the simulated shifts. `bound` is the peak jerk [m/s^3] below which no profile
+    comes on the nominal driveline, None where it is not known.
     """
 
     task: Task
@@ -83,6 +85,7 @@ class Calibration:
     after: Assessment
     fresh: Scenarios
     runs: int
+    bound: float | None
 
 
 def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
@@ -100,7 +103,8 @@ def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
         fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)
         before, after = (assess(task, plant, one, fresh) for one in (space.start, best))
         after = add_promise(task, plant, after)
-    return Calibration(task, before, after, fresh, plant.count.runs)
+    bound = compute_lower_bound(task.maneuver, task.limits)
+    return Calibration(task, before, after, fresh, plant.count.runs, bound)
 
 
 def make_quick_plant(task: Task, *more: Metric) -> Plant:

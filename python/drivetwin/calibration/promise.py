@@ -9,7 +9,7 @@ edge of the range may have all of its units above them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,14 +24,17 @@ TYPES, UNITS = "uncertainty of identified values", "production scatter"
 """Names of the two stages of the draws."""
 ACTUATORS = "actuators"
 """Name of the actuators and the engine lag among the uncertainties."""
+COMMON = "several together"
+"""Name of the variance that goes with more than one element."""
 
 
 @dataclass(frozen=True)
 class Promise:
     """Promised levels (SI) by metric, and shares of the variance of peak jerk by uncertainty.
 
-    The shares of the two stages add up to 1. Each other share is that of the best fit by one
-    element alone; elements whose values go together share theirs.
+    The shares of the two stages add up to 1. So do the others with what no quadratic explains: each
+    is the part that only this element explains, `COMMON` that of elements whose values go together.
+    The latter is below zero where they cancel each other.
     """
 
     levels: Mapping[Metric, float]
@@ -75,8 +78,13 @@ def _compute_shares(values: FloatArray, scenarios: Scenarios, types: int) -> dic
     by_type = values.reshape(types, -1)
     between = float(by_type.mean(axis=1).var())
     shares = {TYPES: between / whole, UNITS: 1.0 - between / whole}
-    explained = {name: _explain(values, one) for name, one in _group_numbers(scenarios).items()}
-    return shares | {name: one for name, one in explained.items() if one is not None}
+    terms = {name: _expand(one) for name, one in _group_numbers(scenarios).items()}
+    together = _explain(values, list(terms.values()))
+    own = {
+        name: together - _explain(values, [one for each, one in terms.items() if each != name])
+        for name in terms
+    }
+    return shares | own | {COMMON: together - sum(own.values())}
 
 
 def _group_numbers(scenarios: Scenarios) -> dict[str, FloatArray]:
@@ -97,22 +105,22 @@ def _group_numbers(scenarios: Scenarios) -> dict[str, FloatArray]:
     return found
 
 
-def _explain(values: FloatArray, columns: FloatArray) -> float | None:
-    """Share of the variance of values (n,) by a quadratic in columns (n, k), without chance.
+def _expand(columns: FloatArray) -> FloatArray:
+    """Return the terms (n, t) of a quadratic in columns (n, k), without its constant."""
+    varied = columns[:, np.ptp(columns, axis=0) > 0.0]
+    unit = (varied - varied.mean(axis=0)) / varied.std(axis=0)
+    first, second = np.triu_indices(unit.shape[1])
+    return np.concatenate([unit, unit[:, first] * unit[:, second]], axis=1)
 
-    None where there are fewer values than coefficients.
+
+def _explain(values: FloatArray, terms: Sequence[FloatArray]) -> float:
+    """Share of the variance of values (n,) by terms (n, t) of all elements, without chance.
+
+    Nothing where there are fewer values than coefficients.
 
     Source: H. Theil, Principles of Econometrics (1971), adjusted coefficient of determination.
     """
-    varied = columns[:, np.ptp(columns, axis=0) > 0.0]
-    if varied.shape[1] == 0:
-        return 0.0
-    unit = (varied - varied.mean(axis=0)) / varied.std(axis=0)
-    first, second = np.triu_indices(unit.shape[1])
-    rows = np.concatenate([np.ones((len(unit), 1)), unit, unit[:, first] * unit[:, second]], axis=1)
+    rows = np.concatenate([np.ones((values.size, 1)), *terms], axis=1)
     found, _, rank, _ = np.linalg.lstsq(rows, values, rcond=None)
-    free = len(values) - int(rank)
-    if free <= 0:
-        return None
-    rest = float(np.sum((values - rows @ found) ** 2)) / free
-    return float(np.clip(1.0 - rest / values.var(ddof=1), 0.0, 1.0))
+    rest = float(np.sum((values - rows @ found) ** 2)) / max(values.size - int(rank), 1)
+    return float(1.0 - rest / values.var(ddof=1)) if values.size > rank else 0.0

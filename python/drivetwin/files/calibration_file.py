@@ -206,6 +206,7 @@ def build_certificate_document(found: Calibration) -> dict[str, Any]:
         "schema": "drivetwin/certificate-1",
         "seed": found.task.seed,
         "simulated_shifts": found.runs,
+        "lower_bound_m_s3": found.bound,
         "metrics": {name.value: asdict(spec) for name, spec in METRICS.items()},
         "before": to_plain_values(asdict(found.before.certificate)),
         "after": {

@@ -183,8 +183,19 @@ def _build_headline(found: Calibration) -> list[Block]:
         TextBlock(
             f"Peak jerk of 95 % of the units {old:.1f} → {new:.1f} m/s³ "
             f"({100.0 * (new / old - 1.0):+.0f} %); {kept} of {len(limits)} limits are kept."
+            + _describe_gap(found.bound, new)
         ),
     ]
+
+
+def _describe_gap(bound: float | None, jerk: float) -> str:
+    """Describe the distance from the bound from below, if there is one."""
+    if bound is None:
+        return ""
+    return (
+        f" No profile comes below {bound:.2g} m/s³ on the nominal driveline: a gap of "
+        f"{jerk - bound:.3g} m/s³ for the spread of the units and the policy."
+    )
 
 
 def _build_limits(found: Calibration) -> TableBlock:
@@ -271,7 +282,7 @@ def _build_shares(found: Calibration) -> TableBlock:
     ]
     return make_table(
         "Variance of peak jerk by its source: uncertainty of identified values and production "
-        "scatter, then each element alone",
+        "scatter; then what only one element explains, and what several do together",
         ("uncertainty", ("share [%]", ".0f")),
         rows,
     )

@@ -81,10 +81,10 @@ def _describe_sensors(found: Identification) -> dict[str, SpeedSensor]:
     """Sensors of the speeds in the log; empty for one that was not kept."""
     signals, sensors = found.evidence.signals, {}
     for name in ("engine_speed", "output_speed") if signals else ():
-        parts = [getattr(one, name) for one in signals]
-        quantum = min(estimate_rounding_step(one.values) for one in parts)
-        noise = np.mean([one.sigma**2 for one in parts]) - quantum**2 / 12.0
-        period = np.median(np.concatenate([np.diff(one.time) for one in parts]))
+        records = [getattr(one, name) for one in signals]
+        quantum = min(estimate_rounding_step(one.values) for one in records)
+        noise = np.mean([one.sigma**2 for one in records]) - quantum**2 / 12.0
+        period = np.median(np.concatenate([np.diff(one.time) for one in records]))
         sensors[name] = SpeedSensor(float(max(noise, 0.0) ** 0.5), quantum, float(period))
     return sensors
 
