@@ -8,9 +8,7 @@ import re
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import typer
+from typing import TYPE_CHECKING
 
 from drivetwin._util.request import CELSIUS, REQUIRED, flag, input_file, option, output_folder
 from drivetwin.calibration.options import CalibrationOptions
@@ -22,7 +20,7 @@ from drivetwin.cli.calibrate_logs import (
     load_starts,
     to_correction_document,
 )
-from drivetwin.cli.output import print_blocks, print_json, print_line, show_step, to_error_document
+from drivetwin.cli.output import show_step
 from drivetwin.cli.own_controller import compile_controller
 from drivetwin.errors import (
     DrivetwinError,
@@ -31,6 +29,7 @@ from drivetwin.errors import (
     InputError,
     Where,
 )
+from drivetwin.report.blocks import Block, Outcome
 
 if TYPE_CHECKING:
     from drivetwin.calibration.calibrate import Calibration
@@ -41,7 +40,6 @@ if TYPE_CHECKING:
     from drivetwin.calibration.twin_task import Request
     from drivetwin.files.limits_file import StagesFile
     from drivetwin.findings import Finding
-    from drivetwin.report.blocks import Block
     from drivetwin.twin.twin import Twin
 
     Results = tuple[Calibration, Front | None, OperatingMap | None]
@@ -94,7 +92,7 @@ class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
     )
 
 
-def calibrate(request: Calibrate, *, as_json: bool) -> None:
+def calibrate(request: Calibrate) -> Outcome:
     """Find shift profiles with a small peak jerk over production scatter.
 
     Minimise the tail mean of peak jerk under limits, and certify the result on fresh draws. Write
@@ -103,13 +101,14 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
     Where a limit is out of reach, the best calibration found is written and the exit code is 2.
     """
     from drivetwin.calibration.identified_range import check_identified_range
+    from drivetwin.files.calibration_file import build_calibration_document
+    from drivetwin.files.records import dump_findings
     from drivetwin.report.calibration import build_calibration_blocks
     from drivetwin.report.correction import build_correction_blocks
 
     if request.controller is not None:
         request = replace(request, policy=PolicyKind.OWN)
     model = load_valid_twin(request.twin)
-    output = request.output
     given = request.controller
     with nullcontext() if given is None else compile_controller(given) as controller:
         task, correction = _build_request(request, model, controller)
@@ -119,24 +118,21 @@ def calibrate(request: Calibrate, *, as_json: bool) -> None:
         found = results[0]
         findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
         findings = (*list_log_findings(correction), *findings)
-        learned = None if correction is None else build_correction_blocks(correction, found)
-        with show_step(f"writing {output}"):
-            _write_results(request, results, (findings, learned or []), (model, task))
+        learned = [] if correction is None else build_correction_blocks(correction, found)
+        with show_step(f"writing {request.output}"):
+            files = _write_results(request, results, (findings, learned), (model, task))
     stages.remove()
-    infeasible = _find_excess(found, output)
-    if as_json:
-        fault = {} if infeasible is None else to_error_document(infeasible)
-        document = _to_document(results, findings, output)
-        print_json({**document, **to_correction_document(correction), **fault})
-        if infeasible is not None:
-            raise typer.Exit(infeasible.exit_code)
-        return
-    if learned is not None:
-        print_blocks(learned)
-    print_blocks(build_calibration_blocks(found, findings, *results[1:]))
-    print_line(f"wrote {output / REPORT}")
-    if infeasible is not None:
-        raise infeasible
+    return Outcome(
+        [*learned, *build_calibration_blocks(found, findings, *results[1:])],
+        {
+            "folder": str(request.output),
+            **build_calibration_document(*results),
+            "findings": dump_findings(findings),
+            **to_correction_document(correction),
+        },
+        files,
+        fault=_find_excess(found, request.output),
+    )
 
 
 def _find_excess(found: Calibration, output: Path) -> DrivetwinError | None:
@@ -322,7 +318,7 @@ def _write_results(
     results: Results,
     shown: tuple[tuple[Finding, ...], list[Block]],
     origin: tuple[Twin, Request],
-) -> None:
+) -> tuple[Path, ...]:
     from drivetwin._util.atomic import compute_digest, write_text
     from drivetwin._util.optional_dependencies import get_program_version
     from drivetwin._util.plain_values import format_json
@@ -371,23 +367,5 @@ def _write_results(
         write_text(folder / REPORT, page)
         if len(sources) > 1:
             save_twin(folder / TWIN, twin)
-
-
-def _to_document(results: Results, findings: tuple[Finding, ...], output: Path) -> dict[str, Any]:
-    from drivetwin.files.calibration_file import (
-        build_certificate_document,
-        build_front_records,
-        build_map_records,
-    )
-    from drivetwin.files.records import dump_findings
-
-    found, front, mapped = results
-    policy = found.task.policy
-    return {
-        "folder": str(output),
-        "parameters": policy.name_values(found.after.values),
-        "certificate": build_certificate_document(found),
-        "front": [one.model_dump(mode="json") for one in build_front_records(front, policy)],
-        "map": [one.model_dump(mode="json") for one in build_map_records(mapped)],
-        "findings": dump_findings(findings),
-    }
+        names = sorted(one.name for one in folder.iterdir())
+    return tuple(request.output / one for one in names)

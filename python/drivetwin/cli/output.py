@@ -215,17 +215,16 @@ def deliver(outcomes: Iterable[Outcome], *, as_json: bool, strict: bool) -> None
         documents = [_build_document(one) for one in made]
         print_json(documents[0] if len(documents) == 1 else {"results": documents})
     for one in reversed(made):
-        if one.fault is not None:
-            raise typer.Exit(one.fault.exit_code)
+        if code := one.exit_code if one.fault is None else one.fault.exit_code:
+            raise typer.Exit(code)
     if strict and not all(one.is_confirmed for one in made):
         raise typer.Exit(NOT_CONFIRMED)
 
 
 def _build_document(one: Outcome) -> dict[str, Any]:
-    if one.document is None and one.fault is not None:
-        return to_error_document(one.fault)
+    fault = {} if one.fault is None else to_error_document(one.fault)
     files = {"files": [str(file) for file in one.files]} if one.files else {}
-    return {**(one.document or {}), **files}
+    return {**(one.document or {}), **files, **fault}
 
 
 @contextmanager

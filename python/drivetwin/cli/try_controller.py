@@ -3,18 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import typer
 
 from drivetwin._util.request import REQUIRED, SECOND, input_file, option, output_folder
 from drivetwin.calibration.options import ShiftOptions
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.cli.arguments import REPORT, TwinInput
-from drivetwin.cli.output import print_blocks, print_json, show_step
+from drivetwin.cli.output import show_step, write_texts
 from drivetwin.cli.own_controller import compile_controller
+from drivetwin.report.blocks import Outcome
 
 if TYPE_CHECKING:
     from drivetwin.calibration.trial import Trial
@@ -45,7 +45,7 @@ class Try(ShiftOptions, TwinInput, command="try"):
     output: Path | None = output_folder("Folder for report.html and junit.xml.")
 
 
-def try_controller(request: Try, *, as_json: bool) -> None:
+def try_controller(request: Try) -> Outcome:
     """Test a controller in C on drawn units of a twin, with faults and assertions.
 
     Run the scenarios of a file, or those in stock: mass, gradient, oil, torque, pedal, weak
@@ -55,29 +55,32 @@ def try_controller(request: Try, *, as_json: bool) -> None:
     from drivetwin.calibration.trial_comparison import compare_trials
     from drivetwin.cli.calibrate import load_valid_twin
     from drivetwin.files.limits_file import STOCK, load_trials
-    from drivetwin.report.trial import build_trial_blocks
+    from drivetwin.report.trial import build_trial_blocks, format_junit, render_trials
 
     twin, trials = load_valid_twin(request.twin), load_trials(request.scenarios or STOCK)
     found = _run(twin, trials, request, request.controller)
     differences: list[Difference] = []
     if request.against is not None:
         differences = compare_trials(found, _run(twin, trials, request, request.against))
+    files: Sequence[Path] = ()
     if request.output is not None:
-        _write_results(request.output, found, differences, request.controller)
-    if as_json:
-        states = [
-            {
-                "scenario": one.scenario.name,
-                "error": one.error,
-                "checks": [asdict(check) for check in one.checks],
-            }
-            for one in found
-        ]
-        print_json({"scenarios": states, "differences": [asdict(one) for one in differences]})
-    else:
-        print_blocks(build_trial_blocks(found, differences))
-    if any(one.failed for one in found):
-        raise typer.Exit(FAILED)
+        name = request.controller.stem
+        page = render_trials(found, differences, f"Test of {name}")
+        files = write_texts(request.output, {JUNIT: format_junit(found, name), REPORT: page})
+    states = [
+        {
+            "scenario": one.scenario.name,
+            "error": one.error,
+            "checks": [asdict(check) for check in one.checks],
+        }
+        for one in found
+    ]
+    return Outcome(
+        build_trial_blocks(found, differences),
+        {"scenarios": states, "differences": [asdict(one) for one in differences]},
+        files,
+        exit_code=FAILED if any(one.failed for one in found) else 0,
+    )
 
 
 def _run(twin: Twin, trials: TrialFile, request: Try, path: Path) -> list[Trial]:
@@ -96,15 +99,3 @@ def _run(twin: Twin, trials: TrialFile, request: Try, path: Path) -> list[Trial]
     with compile_controller(path, bench=True) as given, show_step(f"testing {path.name}"):
         own = replace(given, task=request.task or given.task)
         return run_trials(twin, asked, own, scenarios)
-
-
-def _write_results(
-    folder: Path, found: list[Trial], differences: list[Difference], path: Path
-) -> None:
-    from drivetwin._util.atomic import write_text
-    from drivetwin.cli.output import write_atomically
-    from drivetwin.report.trial import format_junit, render_trials
-
-    with write_atomically(folder) as beside:
-        write_text(beside / JUNIT, format_junit(found, path.stem))
-        write_text(beside / REPORT, render_trials(found, differences, f"Test of {path.stem}"))

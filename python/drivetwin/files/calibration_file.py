@@ -200,6 +200,19 @@ def read_calibration_file(path: Path) -> CalibrationFile:
     return read_record(path, parse_toml, CALIBRATION_SCHEMA, CalibrationFile)
 
 
+def build_calibration_document(
+    found: Calibration, front: Front | None, mapped: OperatingMap | None
+) -> dict[str, Any]:
+    """Return values, certificate, front and map of a calibration as a JSON document."""
+    policy = found.task.policy
+    return {
+        "parameters": policy.name_values(found.after.values),
+        "certificate": build_certificate_document(found),
+        "front": [one.model_dump(mode="json") for one in build_front_records(front, policy)],
+        "map": [one.model_dump(mode="json") for one in build_map_records(mapped)],
+    }
+
+
 def build_certificate_document(found: Calibration) -> dict[str, Any]:
     """Return the certificates before and after as a JSON document."""
     return {

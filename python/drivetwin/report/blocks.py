@@ -241,7 +241,7 @@ class Outcome:
     `blocks` are for people, `lines` below them are never wrapped; `document` is for programs;
     `files` were written. `is_confirmed` is false for a result that a strict run refuses. `fault` is
     the error of a part, beside which the rest was done. `is_json` is true where the document is the
-    result for people too.
+    result for people too. `exit_code` is that of a complete result, such as of a failed test.
     """
 
     blocks: Sequence[Block] = ()
@@ -251,3 +251,4 @@ class Outcome:
     fault: DrivetwinError | None = None
     lines: Sequence[str] = ()
     is_json: bool = False
+    exit_code: int = 0
