@@ -9,10 +9,13 @@ import pytest
 from playwright.sync_api import Browser
 
 from drivetwin.cli import main
+from drivetwin.files.twin_file import save_twin
+from tests.calibration.twins import make_hydraulic_twin
 from tests.support.bus_logs import write_bus_logs
 
 pytestmark = pytest.mark.browser
 
+CONTROLLER = Path(__file__).parents[1] / "cli" / "own_controllers" / "regulator.toml"
 WIDTH = 900
 PAGES = (
     "identify/report.html",
@@ -25,6 +28,10 @@ PAGES = (
     "prediction.html",
     "bus/report.html",
     "drive/drive.html",
+    "calibration/report.html",
+    "tested/report.html",
+    "fleet.html",
+    "controller/report.html",
 )
 BROKEN = """() => [...document.querySelectorAll("td, th")].filter((cell) =>
     cell.offsetParent && cell.scrollWidth > cell.clientWidth + 1).map((cell) => cell.innerText)
@@ -54,6 +61,16 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_bus_logs(folder)
     run("identify", "@run0.csv", "@run1.csv", "@run2.csv", "--hold-out", "run2", "-o", "@bus")
     run("drive", "-o", "@drive")
+    effort = ("--draws", "60", "--effort", "0.05")
+    run("calibrate", "@identify", "--shift", "2-3", *effort, "--front", "-o", "@calibration")
+    save_twin(folder / "hydraulic.toml", make_hydraulic_twin())
+    tested = ("--shift", "2-3", "--controller", str(CONTROLLER), "--draws", "59", "-o", "@tested")
+    run("try", "@hydraulic.toml", *tested)
+    fleet = ("--vehicle", "@shift.card.toml", "--quick", "--workers", "1", "-o", "@store")
+    run("fleet", "@shift.csv", *fleet)
+    run("fleet", "report", "@store", "-o", "@fleet.html")
+    run("synth", "--scenario", "controller_log", "-o", "@control.csv")
+    run("identify", "@control.csv", "--vehicle", "@control.card.toml", "-o", "@controller")
     return folder
 
 
