@@ -218,9 +218,11 @@ class Request:
 
     def refuse_stated(self, names: Iterable[str], reason: str) -> None:
         """Raise InputError if one of the arguments was given; `reason` is why it has no effect."""
+        declared = get_arguments(type(self))
         for name in sorted(self.stated.intersection(names)):
-            what = f"{spell_option(name)} has no effect here: {reason}"
-            raise InputError(what, "leave it out", Where(key=spell_option(name)))
+            spelt = next((one for one in declared[name].names if one), spell_option(name))
+            what = f"{spelt} has no effect here: {reason}"
+            raise InputError(what, "leave it out", Where(key=spelt))
 
     def __setattr__(self, name: str, value: object) -> None:
         raise FrozenInstanceError(f"cannot assign to field {name!r}")

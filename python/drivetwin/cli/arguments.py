@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 RESULT, TWIN, REPORT = "result.json", "twin.toml", "report.html"
 """Files that `identify -o` writes."""
-BUS_RESULT = "bus.json"
-"""Result that `identify -o` writes for bus logs."""
+BUS_RESULT, TCU_RESULT = "bus.json", "tcu.json"
+"""Results that `identify -o` writes for bus logs, and for logs of a gearbox control."""
 FIT_RESULT, MODEL = "fit.json", "model.toml"
 """Files that `fit -o` writes beside the report."""
 GEARBOX_HELP = "Gearbox card (TOML), or name of a built-in gearbox."

@@ -10,20 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.progress import scale_progress
-from drivetwin._util.request import FileRole, Request, flag, input_file, option, output_folder
 from drivetwin.cli.arguments import (
     BUS_RESULT,
     REPORT,
     RESULT,
     TWIN,
     find_mapping,
-    logs_argument,
-    mapping_option,
-    method_option,
-    quick_option,
-    strict_flag,
 )
-from drivetwin.cli.identify_run import IdentifyOptions, build_outcome, effects_option, read_shifts
+from drivetwin.cli.identify_run import Identify, IdentifyOptions, build_outcome, read_shifts
 from drivetwin.cli.output import (
     refuse_same_names,
     show_findings,
@@ -33,46 +27,12 @@ from drivetwin.cli.output import (
 )
 from drivetwin.errors import DrivetwinError, InputError, Where
 from drivetwin.estimation.likelihood.mechanism import quick
-from drivetwin.estimation.result.method import Method
 from drivetwin.report.blocks import Outcome, Tone
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.shifts.detect import FoundShifts
     from drivetwin.validation.multi_log import JointIdentification
-
-
-class Identify(Request, command="identify"):
-    """Arguments of `identify`."""
-
-    logs: tuple[Path, ...] = logs_argument("One or more shift logs.")
-    vehicle: Path | None = input_file(
-        "Vehicle card, or a card of the ratios alone (TOML); without one, the ratios are taken "
-        "from the speeds of a bus log.",
-        "CARD",
-        FileRole.CARD,
-    )
-    channels: Path | None = mapping_option()
-    method: Method = method_option()
-    quick: bool = quick_option()
-    effects: tuple[str, ...] = effects_option()
-    output: Path | None = output_folder("Folder for result, twin and report.")
-    together: bool = flag("Fit all logs of one vehicle jointly.")
-    hold_out: tuple[str, ...] = option(
-        "Shift to predict instead of fit: its number, a LOG, or LOG:NUMBER; repeatable.",
-        metavar="SHIFT",
-        default=(),
-    )
-    bus: bool = flag("Use speeds, gear and engine torque alone, also with a whole vehicle card.")
-    strict: bool = strict_flag(
-        "every model is valid, limits included; of bus logs, unless the shifts agree and identify "
-        "a quantity"
-    )
-
-    @property
-    def options(self) -> IdentifyOptions:
-        """The options of the identification of a whole vehicle card."""
-        return IdentifyOptions(**self.select(IdentifyOptions))
 
 
 def identify(request: Identify) -> Iterator[Outcome]:

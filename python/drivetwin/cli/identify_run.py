@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a log and a card to an identification with its twin, validation and files."""
+"""Request of `drivetwin identify`; from a log and a card to an identification and its files."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.progress import TimedStages
-from drivetwin._util.request import option
+from drivetwin._util.request import FileRole, Request, flag, input_file, option, output_folder
 from drivetwin.cli.arguments import (
     REPORT,
     RESULT,
     TWIN,
     CardInput,
     find_mapping,
+    logs_argument,
+    mapping_option,
     method_option,
     quick_option,
+    strict_flag,
 )
 from drivetwin.cli.output import show_findings, show_step, write_atomically
 from drivetwin.estimation.likelihood.mechanism import quick
@@ -59,6 +62,39 @@ class IdentifyOptions(CardInput):
 
         card = load_card(self.vehicle)
         return replace(card, effects={**card.effects, **parse_priors(self.effects)})
+
+
+class Identify(Request, command="identify"):
+    """Arguments of `identify`."""
+
+    logs: tuple[Path, ...] = logs_argument("One or more shift logs.")
+    vehicle: Path | None = input_file(
+        "Vehicle card, or a card of the ratios alone (TOML); without one, the ratios are taken "
+        "from the speeds of a bus log.",
+        "CARD",
+        FileRole.CARD,
+    )
+    channels: Path | None = mapping_option()
+    method: Method = method_option()
+    quick: bool = quick_option()
+    effects: tuple[str, ...] = effects_option()
+    output: Path | None = output_folder("Folder for result, twin and report.")
+    together: bool = flag("Fit all logs of one vehicle jointly.")
+    hold_out: tuple[str, ...] = option(
+        "Shift to predict instead of fit: its number, a LOG, or LOG:NUMBER; repeatable.",
+        metavar="SHIFT",
+        default=(),
+    )
+    bus: bool = flag("Use speeds, gear and engine torque alone, also with a whole vehicle card.")
+    strict: bool = strict_flag(
+        "every model is valid, limits included; of bus logs, unless the shifts agree and identify "
+        "a quantity"
+    )
+
+    @property
+    def options(self) -> IdentifyOptions:
+        """The options of the identification of a whole vehicle card."""
+        return IdentifyOptions(**self.select(IdentifyOptions))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 from drivetwin._util.outputs import PAGE, select_outputs
 from drivetwin._util.request import flag, input_file, option, output_file
-from drivetwin.cli.arguments import MODEL, TwinLogInput, read_twin_log, result_argument
+from drivetwin.cli.arguments import (
+    MODEL,
+    TCU_RESULT,
+    TWIN,
+    TwinLogInput,
+    read_twin_log,
+    result_argument,
+)
 from drivetwin.cli.output import print_line, show_step
 from drivetwin.errors import InputError, Where
 from drivetwin.export.targets import DEFAULT_STEP, InputKind
@@ -18,6 +25,7 @@ from drivetwin.report.blocks import Block, Outcome
 if TYPE_CHECKING:
     from drivetwin.estimation.result.validation import Validation
     from drivetwin.report.results import MadeResult
+    from drivetwin.tcu.predict import PredictedShift
     from drivetwin.twin.twin import Twin
 
 
@@ -58,11 +66,10 @@ def simulate(request: Simulate) -> Outcome:
     The result of a fit simulates the recording as a whole by its model.toml.
     The twin of a gearbox control's log predicts shifts from commands and bus torque, with bands.
     """
-    from drivetwin.cli.identify_tcu import find_controller_twin, simulate_controller
     from drivetwin.report.results import open_result
 
-    if (twin := find_controller_twin(request.twin)) is not None:
-        return simulate_controller(twin, request)
+    if (twin := _find_controller_twin(request.twin)) is not None:
+        return _simulate_controller(twin, request)
     made = open_result(request.twin)
     return _simulate_fit(made, request) if made.is_fit else _simulate_twin(made, request)
 
@@ -112,6 +119,65 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
         for run in runs
     ]
     return Outcome(blocks, {"shifts": listed}, request.output)
+
+
+def _find_controller_twin(source: Path) -> Path | None:
+    """Return the twin of a gearbox control's log by its folder, its file or the result beside it;
+    None for another result."""
+    from drivetwin.files.tcu_twin_file import is_tcu_twin
+
+    files = (source / TWIN,) if source.is_dir() else (source, source.with_name(TWIN))
+    if not source.is_dir() and source.name not in (TWIN, TCU_RESULT):
+        files = (source,)
+    return next((one for one in files if is_tcu_twin(one)), None)
+
+
+def _simulate_controller(twin: Path, request: Simulate) -> Outcome:
+    """Predict the shifts of a log with a twin, and compare.
+
+    Raises InputError for options of other twins, and the typed errors of the reader.
+    """
+    from drivetwin._util.atomic import write_text
+    from drivetwin.files.tcu_twin_file import load_tcu_twin, record_prediction
+    from drivetwin.report.blocks import Tone, make_notes
+    from drivetwin.report.tcu import build_prediction_table, render_predictions
+    from drivetwin.tcu.log import read_controller_log
+    from drivetwin.tcu.outcome import list_unfitted_kinds, predict
+
+    unused = ("vehicle", "step", "parameters", "from_command", "template")
+    reason = "the twin of a gearbox control's log is driven by its commands"
+    request.refuse_stated(unused, reason)
+    model, log = load_tcu_twin(twin), request.log
+    with show_step(f"simulating {log.name}"):
+        shifts = read_controller_log(log, model.card, request.channels).shifts
+        predictions = predict(model, shifts)
+    for table in select_outputs(request.output, ".csv"):
+        write_text(table, _format_rows(predictions))
+    for page in select_outputs(request.output, *PAGE):
+        write_text(page, render_predictions(predictions, log.name))
+    kinds = [
+        f"{kind}: no shift of this kind was fitted; its error may be larger than the band."
+        for kind in list_unfitted_kinds(model, shifts)
+    ]
+    blocks = [build_prediction_table(predictions), *make_notes("Warnings", kinds, Tone.DOUBTFUL)]
+    document = {"shifts": [record_prediction(one).model_dump() for one in predictions]}
+    return Outcome(blocks, document, request.output)
+
+
+def _format_rows(predictions: Sequence[PredictedShift]) -> str:
+    """Write measured and predicted speeds of all rows as a table (SI)."""
+    names = ("engine_speed", "input_speed", "output_speed")
+    head = ["time", "shift"]
+    head += [f"{name}{part}" for name in names for part in ("", ".predicted", ".band")]
+    lines = [",".join(head)]
+    for one in predictions:
+        for k, time in enumerate((one.shift.begin + one.shift.time).tolist()):
+            cells = [f"{time:.4f}", str(one.shift.number)]
+            for i in range(len(names)):
+                triple = (one.shift.speeds[k, i], one.speeds[k, i], one.band[k, i])
+                cells += [f"{value:.6g}" for value in triple]
+            lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"
 
 
 def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
