@@ -15,6 +15,8 @@ lag 50 ms. They spread too: dead time 5 ms, frequency 10 %, engine lag 15 %.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from drivetwin.actuator.identify import IdentifiedActuator
@@ -27,10 +29,12 @@ from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.knots import KnotPolicy, KnotProfile, join_profiles
 from drivetwin.calibration.policies.slip import build_slip_policy
-from drivetwin.calibration.scenarios import Draw, KnownDraws
+from drivetwin.calibration.scenarios import Draw, MakeDriveline, scale_units
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
+from drivetwin.simulation.driveline import Driveline
+from drivetwin.simulation.dual_clutch import DualClutch
 from tests.support.upshift.scenario import build_model
 from tests.support.upshift.statement import BAR, make_problem
 
@@ -44,6 +48,18 @@ CPU = 60.0
 FRESH = 4000
 """Fresh draws of the certificate."""
 CERTIFICATE_SEED = 4242
+
+
+@dataclass(frozen=True)
+class KnownDraws:
+    """Draws of made units around a driveline that is known."""
+
+    model: DualClutch
+    spread: Spread
+
+    def __call__(self, _: np.random.Generator) -> MakeDriveline:
+        """Return the units of the driveline."""
+        return lambda random: Driveline(scale_units(self.model, self.spread, random))
 
 
 def list_limits(kind: PolicyKind) -> tuple[Limit, ...]:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from drivetwin.calibration.keep_limits import Repair
+from drivetwin.calibration.keep_limits import keep_limits
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, Statistic
 from drivetwin.calibration.polish import Linear, assemble_program, polish
@@ -119,4 +119,4 @@ def test_a_polish_that_always_exceeds_its_bounds_is_led_within_them(beyond: floa
         return np.array([(1.0 + beyond) * one.bound for one in under.limits])
 
     start = np.array([(1.0 + beyond) * one.bound for one in LIMITS])
-    assert Repair(measure, improve, 3, 3.0).keep_limits(start, KEPT).excess <= 1e-12
+    assert keep_limits(measure, improve, start, KEPT, 3, 3.0).value <= 1e-12

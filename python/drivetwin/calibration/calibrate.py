@@ -16,7 +16,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import TimedStages
 from drivetwin.calibration.certificate import Certificate, certify
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.keep_limits import TOLERANCE, Repair
+from drivetwin.calibration.keep_limits import TOLERANCE, keep_limits
 from drivetwin.calibration.lower_bound import compute_lower_bound
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric, Outcome
@@ -237,16 +237,17 @@ def _keep_limits(task: Task, plant: Plant, objective: Objective, found: FloatArr
         certificate = certify(outcome, task.limits, settings.confidence)
         return [one.excess for one in certificate.limits]
 
-    held = Exchange(assess, exchange, settings.repairs).hold_lockup(found, objective)
-    wider = _make_run(task, quick, tail.join(draws.select(held.joined)))
+    held, joined = hold_lockup(assess, exchange, found, objective, settings.repairs)
+    wider = _make_run(task, quick, tail.join(draws.select(joined)))
 
     def improve(at: FloatArray, objective: Objective) -> FloatArray:
         return polish(wider, at, objective, settings.repair_iterations).coordinates
 
-    repair = Repair(measure, improve, settings.repairs, settings.repair_weight)
-    kept = repair.keep_limits(held.coordinates, objective)
-    if kept.excess > TOLERANCE:
-        kept = min(kept, repair.keep_limits(space.start, objective), key=lambda one: one.excess)
+    rounds = settings.repairs, settings.repair_weight
+    kept = keep_limits(measure, improve, held, objective, *rounds)
+    if kept.value > TOLERANCE:
+        again = keep_limits(measure, improve, space.start, objective, *rounds)
+        kept = min(kept, again, key=lambda one: one.value)
     return kept.coordinates
 
 
@@ -260,44 +261,50 @@ def _make_run(task: Task, plant: Plant, draws: Scenarios) -> Run:
     return run
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """Coordinates (q,), and the draws of the check (n,) that joined those of the polish."""
-
-    coordinates: FloatArray
-    joined: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class Exchange:
+def hold_lockup(
+    assess: Callable[[FloatArray], Outcome],
+    improve: Callable[[FloatArray, NDArray[np.bool_]], FloatArray],
+    start: FloatArray,
+    objective: Objective,
+    rounds: int,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Polish with the draws of a check that slip again after their lock-up.
 
-    A second slip is so rare that the draws of a polish miss it. `assess` returns the outcome of
-    coordinates (q,) over the draws of the check, `improve` the coordinates after a polish in which
-    the marked draws (n,) of the check take part. Rounds end when no unit slips again, or one gains
-    nothing.
+    A second slip is so rare that the draws of a polish miss it. Rounds end when no unit slips
+    again, or one gains nothing.
 
     Source: exchange method of J. Blankenship and J. Falk, Infinitely constrained optimization
     problems, J. Optimization Theory and Applications 19 (1976).
+
+    Parameters
+    ----------
+    assess
+        Outcome of coordinates (q,) over the draws of the check.
+    improve
+        Coordinates after a polish in which the marked draws (n,) of the check take part.
+    start
+        Coordinates (q,).
+    objective
+        Objective of the polish.
+    rounds
+        Largest number of polishes.
+
+    Returns
+    -------
+    tuple
+        Coordinates (q,) of the least objective over the draws of the check, and the draws (n,) that
+        took part.
     """
-
-    assess: Callable[[FloatArray], Outcome]
-    improve: Callable[[FloatArray, NDArray[np.bool_]], FloatArray]
-    rounds: int
-
-    def hold_lockup(self, start: FloatArray, objective: Objective) -> Held:
-        """Return the coordinates of the least objective over the draws of the check."""
-        outcome = self.assess(start)
-        best = Held(start, np.zeros(outcome.relocked.size, np.bool_))
-        least = objective.evaluate(outcome)
-        for _ in range(self.rounds):
-            if not outcome.relocked.any():
-                break
-            joined = best.joined | outcome.relocked
-            tried = self.improve(best.coordinates, joined)
-            outcome = self.assess(tried)
-            value = objective.evaluate(outcome)
-            if value >= least:
-                break
-            best, least = Held(tried, joined), value
-        return best
+    outcome = assess(start)
+    best, joined, least = start, np.zeros_like(outcome.relocked), objective.evaluate(outcome)
+    for _ in range(rounds):
+        if not outcome.relocked.any():
+            break
+        marked = joined | outcome.relocked
+        tried = improve(best, marked)
+        outcome = assess(tried)
+        value = objective.evaluate(outcome)
+        if value >= least:
+            break
+        best, joined, least = tried, marked, value
+    return best, joined

@@ -4,55 +4,63 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import spell_unit
 from drivetwin.calibration.certificate import LimitCheck
 from drivetwin.calibration.metrics import METRICS
 from drivetwin.calibration.objective import Objective
+from drivetwin.calibration.search import Candidate
 from drivetwin.errors import InfeasibleError
 
 TOLERANCE = 0.01
 """Relative excess over a limit from which the limit counts as out of reach."""
 
 
-@dataclass(frozen=True, eq=False)
-class KeptLimits:
-    """Coordinates (q,) and the largest relative excess over a limit, negative within all."""
-
-    coordinates: FloatArray
-    excess: float
-
-
-@dataclass(frozen=True)
-class Repair:
-    """Polish under tighter limits.
+def keep_limits(
+    measure: Callable[[FloatArray], list[float]],
+    improve: Callable[[FloatArray, Objective], FloatArray],
+    start: FloatArray,
+    objective: Objective,
+    rounds: int,
+    factor: float,
+) -> Candidate:
+    """Polish under tighter limits until all are kept.
 
     The polish sees few draws, and its penalty is soft: where comfort gains more by an excess than
-    the excess costs, the limit is exceeded. `measure` returns the relative excess of coordinates
-    (q,) over each limit on draws of their own. Each of at most `rounds` polishes by `improve` has
-    bounds lower by the excess before it, and a weight that is larger by `factor`.
+    the excess costs, the limit is exceeded.
+
+    Parameters
+    ----------
+    measure
+        Relative excess of coordinates (q,) over each limit, on draws of their own.
+    improve
+        Coordinates (q,) after a polish.
+    start
+        Coordinates (q,).
+    objective
+        Objective of the first polish.
+    rounds
+        Largest number of polishes, each with bounds lower by the excess before it.
+    factor
+        Factor on the weight of the excess from one polish to the next.
+
+    Returns
+    -------
+    Candidate
+        The first coordinates that keep all limits, or those with the least excess, and that excess.
     """
-
-    measure: Callable[[FloatArray], list[float]]
-    improve: Callable[[FloatArray, Objective], FloatArray]
-    rounds: int
-    factor: float
-
-    def keep_limits(self, start: FloatArray, objective: Objective) -> KeptLimits:
-        """Return the first coordinates that keep all limits, or those with the least excess."""
-        at, tried = start, []
-        for number in range(self.rounds + 1):
-            excesses = self.measure(at)
-            tried.append(KeptLimits(at, max(excesses, default=0.0)))
-            if tried[-1].excess <= 0.0 or number == self.rounds:
-                break
-            beyond = [max(one, 0.0) for one in excesses]
-            tighter = objective.tighten([one / (1.0 + one) for one in beyond])
-            objective = tighter.scale_weight(self.factor)
-            at = self.improve(at, objective)
-        return min(tried, key=lambda one: max(one.excess, 0.0))
+    at, tried = start, []
+    for number in range(rounds + 1):
+        excesses = measure(at)
+        tried.append(Candidate(at, max(excesses, default=0.0)))
+        if tried[-1].value <= 0.0 or number == rounds:
+            break
+        beyond = [max(one, 0.0) for one in excesses]
+        tighter = objective.tighten([one / (1.0 + one) for one in beyond])
+        objective = tighter.scale_weight(factor)
+        at = improve(at, objective)
+    return min(tried, key=lambda one: max(one.value, 0.0))
 
 
 def require_limits(found: Sequence[LimitCheck], start: Sequence[LimitCheck]) -> None:

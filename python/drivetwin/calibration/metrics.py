@@ -211,6 +211,11 @@ class _Runs:
         """Jerk of the vehicle [m/s^3]."""
         return compute_rates(self.maneuver.time, self.acceleration)
 
+    @property
+    def driving(self) -> FloatArray:
+        """Output torque in the direction of power [N m]."""
+        return np.asarray(np.sign(self.torque[:, :1]) * self.torque)
+
     @cached_property
     def power(self) -> FloatArray:
         """Friction power of both elements [W]."""
@@ -244,25 +249,11 @@ def compute_metrics(
     return Outcome(values, runs.jerk, unlocked | failed, _find_relocks(runs.on_slip))
 
 
-def _compute_peak_jerk(runs: _Runs) -> FloatArray:
-    return np.asarray(np.abs(runs.jerk).max(axis=1))
-
-
 def _compute_smooth_jerk(runs: _Runs) -> FloatArray:
     dt = runs.maneuver.step
     sections = butter(2, LOW_PASS, fs=1.0 / dt, output="sos")
     filtered = sosfilt(sections, runs.acceleration, axis=-1)
     return np.asarray(np.abs(np.diff(filtered, axis=-1)).max(axis=1) / dt, dtype=np.float64)
-
-
-def _compute_vibration_dose(runs: _Runs) -> FloatArray:
-    return compute_vibration_doses(runs.maneuver.time, runs.acceleration)
-
-
-def _compute_torque_hole(runs: _Runs) -> FloatArray:
-    driving = np.sign(runs.torque[:, :1]) * runs.torque
-    level = np.minimum(driving[:, 0], driving[:, -1])
-    return np.asarray(np.maximum(level - driving.min(axis=1), 0.0))
 
 
 def _compute_shift_time(runs: _Runs) -> FloatArray:
@@ -278,37 +269,10 @@ def _compute_response_time(runs: _Runs) -> FloatArray:
     return np.asarray(runs.maneuver.time[first] - runs.maneuver.request)
 
 
-def _compute_friction_energy(runs: _Runs) -> FloatArray:
-    return np.asarray(runs.power.sum(axis=1) * runs.maneuver.step)
-
-
-def _compute_peak_power(runs: _Runs) -> FloatArray:
-    return np.asarray(runs.power.max(axis=1))
-
-
-def _compute_flare(runs: _Runs) -> FloatArray:
-    """Slip is ω_e/(i_in·i_c) - i_out·ω_out: its excess at the engine is i_in·i_c times it."""
-    shift = runs.maneuver
-    lead = shift.model.i_in * shift.offgoing.i_c * runs.off_slip
-    return np.asarray(np.maximum(-shift.direction * lead, 0.0).max(axis=1))
-
-
-def _compute_tie_up(runs: _Runs) -> FloatArray:
-    return np.asarray(np.maximum(-np.sign(runs.off[:, :1]) * runs.off, 0.0).max(axis=1))
-
-
 def _compute_torque_reduction(runs: _Runs) -> FloatArray:
     assert runs.inputs is not None
     demand = runs.maneuver.point.engine_torque
     return _extend(np.abs(runs.inputs[:, 0] - demand).max(axis=-1), runs)
-
-
-def _compute_torque_rate(runs: _Runs) -> FloatArray:
-    return _compute_input_rate(runs, slice(0, 1))
-
-
-def _compute_pressure_rate(runs: _Runs) -> FloatArray:
-    return _compute_input_rate(runs, slice(1, 3))
 
 
 def _compute_input_rate(runs: _Runs, chosen: slice) -> FloatArray:
@@ -323,20 +287,31 @@ def _extend(values: FloatArray, runs: _Runs) -> FloatArray:
 
 
 _COMPUTE: Mapping[Metric, Callable[[_Runs], FloatArray]] = {
-    Metric.PEAK_JERK: _compute_peak_jerk,
+    Metric.PEAK_JERK: lambda runs: np.abs(runs.jerk).max(axis=1),
     Metric.SMOOTH_JERK: _compute_smooth_jerk,
-    Metric.VIBRATION_DOSE: _compute_vibration_dose,
-    Metric.TORQUE_HOLE: _compute_torque_hole,
+    Metric.VIBRATION_DOSE: lambda runs: compute_vibration_doses(
+        runs.maneuver.time, runs.acceleration
+    ),
+    Metric.TORQUE_HOLE: lambda runs: np.maximum(
+        runs.driving[:, [0, -1]].min(axis=1) - runs.driving.min(axis=1), 0.0
+    ),
     Metric.SHIFT_TIME: _compute_shift_time,
     Metric.RESPONSE_TIME: _compute_response_time,
-    Metric.FRICTION_ENERGY: _compute_friction_energy,
-    Metric.PEAK_POWER: _compute_peak_power,
-    Metric.FLARE: _compute_flare,
-    Metric.TIE_UP: _compute_tie_up,
+    Metric.FRICTION_ENERGY: lambda runs: runs.power.sum(axis=1) * runs.maneuver.step,
+    Metric.PEAK_POWER: lambda runs: runs.power.max(axis=1),
+    # Slip is ω_e/(i_in·i_c) - i_out·ω_out: its excess at the engine is i_in·i_c times it.
+    Metric.FLARE: lambda runs: np.maximum(
+        -runs.maneuver.direction
+        * (runs.maneuver.model.i_in * runs.maneuver.offgoing.i_c)
+        * runs.off_slip,
+        0.0,
+    ).max(axis=1),
+    Metric.TIE_UP: lambda runs: np.maximum(-np.sign(runs.off[:, :1]) * runs.off, 0.0).max(axis=1),
     Metric.TORQUE_REDUCTION: _compute_torque_reduction,
-    Metric.TORQUE_RATE: _compute_torque_rate,
-    Metric.PRESSURE_RATE: _compute_pressure_rate,
+    Metric.TORQUE_RATE: lambda runs: _compute_input_rate(runs, slice(0, 1)),
+    Metric.PRESSURE_RATE: lambda runs: _compute_input_rate(runs, slice(1, 3)),
 }
+"""Metrics (runs,) of the runs of a batch."""
 
 
 def _find_relocks(on_slip: FloatArray) -> NDArray[np.bool_]:

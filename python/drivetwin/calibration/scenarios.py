@@ -237,18 +237,6 @@ def scale_units(model: DualClutch, spread: Spread, random: np.random.Generator) 
     )
 
 
-@dataclass(frozen=True)
-class KnownDraws:
-    """Draws of made units around a driveline that is known."""
-
-    model: DualClutch
-    spread: Spread
-
-    def __call__(self, _: np.random.Generator) -> MakeDriveline:
-        """Return the units of the driveline."""
-        return lambda random: Driveline(scale_units(self.model, self.spread, random))
-
-
 @dataclass(frozen=True, eq=False)
 class TwinDraws:
     """Draws of a twin: parameters and friction laws by their joint covariance, and made units.

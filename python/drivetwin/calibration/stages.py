@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.evaluate import Plant
@@ -20,28 +19,18 @@ class Stage:
     runs: int
 
 
-class Stages(Protocol):
-    """Store of finished stages by name."""
+class Stages:
+    """Store of finished stages by name; this one keeps nothing."""
 
-    def recall(self, name: str) -> Stage | None:
+    def recall(self, name: str) -> Stage | None:  # noqa: ARG002
         """Return a finished stage, or None."""
+        return None
 
     def keep(self, name: str, stage: Stage) -> None:
         """Keep a finished stage."""
 
 
-class NoStages:
-    """Store that keeps nothing."""
-
-    def recall(self, name: str) -> Stage | None:  # noqa: ARG002
-        """Return None."""
-        return None
-
-    def keep(self, name: str, stage: Stage) -> None:
-        """Keep nothing."""
-
-
-NO_STAGES = NoStages()
+NO_STAGES = Stages()
 
 
 def name_stage(kind: str, point: OperatingPoint) -> str:

@@ -19,7 +19,7 @@ from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.objective import Limit, build_limit_keys
 from drivetwin.calibration.oil import FRICTION_SLOPE, FRICTION_SLOPE_STD, OilFriction
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.stages import Stage
+from drivetwin.calibration.stages import Stage, Stages
 from drivetwin.calibration.trial import Scenario, build_assertion_keys
 from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.files.records import Record, SchemaName, read_record
@@ -44,7 +44,7 @@ class StagesRecord(Record):
 
 
 @dataclass(eq=False)
-class StagesFile:
+class StagesFile(Stages):
     """Store of finished stages in a file, which is written after each; `inputs` by name as texts.
 
     The file appears with the first stage.
