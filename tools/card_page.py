@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from drivetwin.files.schemas import FileKind, read_key_fields
-from drivetwin.vehicle.ratio_card import CardField
+from drivetwin.vehicle.card_fields import CardField
 
 _TOP = Path(__file__).resolve().parents[1]
 PAGES = {

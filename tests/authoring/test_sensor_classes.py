@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from drivetwin.authoring.sensor_classes import read_sensor_classes
-from drivetwin.vehicle.ratio_card import get_card_field
+from drivetwin.vehicle.card_fields import get_card_field
 
 
 def test_every_class_has_a_source_and_a_limit() -> None:

@@ -21,7 +21,7 @@ from drivetwin.estimation.data.shift_data import (
     ShiftSignals,
 )
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from tests.support.arrays import FloatArray
 

@@ -14,7 +14,7 @@ from drivetwin.errors import DamagedChannelError
 from drivetwin.findings import render
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 
 OLDEST, YOUNGEST, LEAST, LETS_GO = 0.08, 0.02, 0.15, 0.3

@@ -16,7 +16,7 @@ from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from tests.shifts.fixtures import load_reference, make_card, make_log, shared
 

@@ -26,7 +26,7 @@ from drivetwin.estimation.data.shift_data import (
 from drivetwin.estimation.identification import Identification
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.effects import EffectId, EffectPrior
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

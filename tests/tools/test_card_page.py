@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivetwin.files.schemas import FileKind, build_json_schema, read_key_fields
-from drivetwin.vehicle.ratio_card import read_card_fields
+from drivetwin.vehicle.card_fields import read_card_fields
 from tools.card_page import PAGES, fill_page
 
 

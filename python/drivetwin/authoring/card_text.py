@@ -33,7 +33,7 @@ from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
 from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import check_card
-from drivetwin.vehicle.ratio_card import get_card_field
+from drivetwin.vehicle.card_fields import get_card_field
 
 
 def format_card(

@@ -35,7 +35,7 @@ from drivetwin.authoring.stated_number import (
 )
 from drivetwin.channels.units import BAR
 from drivetwin.vehicle.card import RATIO_TOLERANCE
-from drivetwin.vehicle.ratio_card import get_card_field
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ConverterTable
 
 KEY: Key = ("converter",)

@@ -25,7 +25,8 @@ from drivetwin.plausibility.friction import (
 from drivetwin.shifts.breakaway_lockup import locate_torque_dip, smooth_channel
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.ratio_card import ShiftKind, get_card_field
+from drivetwin.vehicle.card_fields import get_card_field
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import (
     ElementKind,
     ElementSpec,

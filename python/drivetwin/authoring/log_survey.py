@@ -28,7 +28,7 @@ from drivetwin.logs.read import Demands, read_recording
 from drivetwin.plausibility.entries import PLAUSIBILITY
 from drivetwin.shifts.kinematics import GearboxSpeeds, find_held_ratios, resample_geared
 from drivetwin.shifts.shift import ShiftSettings
-from drivetwin.vehicle.ratio_card import get_card_field
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ElementSpec, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

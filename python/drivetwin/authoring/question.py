@@ -22,7 +22,7 @@ from drivetwin.authoring.stated_number import (
     parse_ratios,
     parse_stated,
 )
-from drivetwin.vehicle.ratio_card import CardField, get_card_field
+from drivetwin.vehicle.card_fields import CardField, get_card_field
 
 Key = tuple[str, ...]
 """Place of an answer, such as `("final_drive",)` or `("elements", "B2", "kind")`."""

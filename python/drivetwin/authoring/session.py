@@ -30,7 +30,7 @@ from drivetwin.authoring.questions import (
 )
 from drivetwin.authoring.stated_number import Parser, StatedNumber
 from drivetwin.errors import CardError, InputError, Where, suggest_spelling
-from drivetwin.vehicle.ratio_card import list_single_options, read_card_fields
+from drivetwin.vehicle.card_fields import list_single_options, read_card_fields
 
 ORDER: dict[str, Key] = {option: field.key for option, field in list_single_options().items()}
 """Options that each replace one question, in the order in which they are read."""

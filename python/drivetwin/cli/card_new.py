@@ -18,7 +18,7 @@ from drivetwin.cli.output import (
 )
 from drivetwin.errors import DrivetwinError, InputError, Where
 from drivetwin.report.blocks import build_findings_section
-from drivetwin.vehicle.ratio_card import list_single_options
+from drivetwin.vehicle.card_fields import list_single_options
 
 if TYPE_CHECKING:
     from drivetwin.authoring.log_survey import LogSurvey

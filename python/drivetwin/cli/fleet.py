@@ -31,7 +31,7 @@ from drivetwin.cli.arguments import strict_flag
 from drivetwin.cli.command_group import CommandGroup
 from drivetwin.cli.output import NOT_CONFIRMED, make_console, print_blocks, print_line, show_step
 from drivetwin.errors import INTERRUPTED, InputError
-from drivetwin.fleet.coordinator import FleetOptions
+from drivetwin.fleet.options import FleetOptions
 from drivetwin.fleet.task import (
     Event,
     Listener,

@@ -18,7 +18,6 @@ import typer
 from drivetwin._util.atomic import protect_files, remove_unfinished
 from drivetwin._util.outputs import Output, lock_outputs
 from drivetwin._util.request import Argument, FileRole, Request, get_arguments, spell_option
-from drivetwin._util.toml import MAX_SIZE, parse_toml
 from drivetwin.cli.arguments import TWIN
 from drivetwin.cli.output import deliver
 from drivetwin.errors import CardError, FileFormatError, InputError, ResultFileError, Where
@@ -104,6 +103,7 @@ def require_kind(path: Path, wanted: FileRole) -> None:
 
 def recognise_file(path: Path) -> FileRole:
     """Recognise the kind of a file from its content; its name does not matter."""
+    from drivetwin._util.toml import parse_toml
     from drivetwin.logs.formats.detect import is_binary_log
     from drivetwin.logs.raw import HEAD_BYTES
 
@@ -124,6 +124,8 @@ def recognise_file(path: Path) -> FileRole:
 
 def _recognise_document(path: Path, parse: Any) -> FileRole:
     """Recognise a TOML or JSON file by its keys; one that cannot be parsed is unknown."""
+    from drivetwin._util.toml import MAX_SIZE
+
     if path.stat().st_size > MAX_SIZE:
         return FileRole.OTHER
     try:

@@ -17,7 +17,7 @@ import numpy as np
 from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.gearbox import Drive, Reduction
 from drivetwin.gearbox.spec import Capacity
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 FILL = 0.12
 """Time to fill the on-coming element, while the off-going one falls to what it has to hold, s."""

@@ -32,7 +32,7 @@ from drivetwin.files.records import (
     read_record,
 )
 from drivetwin.shifts.shift import RejectedShift
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 
 class ConsistencyRecord(Record):

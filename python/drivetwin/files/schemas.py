@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drivetwin.vehicle.ratio_card import CardField, read_card_fields
+from drivetwin.vehicle.card_fields import CardField, read_card_fields
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

@@ -13,10 +13,9 @@ from contextlib import closing
 from pathlib import Path
 from time import monotonic
 
-from drivetwin._util.request import MEBIBYTE, SECOND, Request, flag, option
 from drivetwin.errors import StoreError, Where
-from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.fleet.index import FileRow
+from drivetwin.fleet.options import FleetOptions
 from drivetwin.fleet.pool import LocalPool, Pool, count_usable_cores
 from drivetwin.fleet.rules import RulesFile
 from drivetwin.fleet.scan import Scan, Scanned, Skipped, make_settings_document
@@ -41,31 +40,6 @@ from drivetwin.fleet.task import (
     WorkerLost,
     WorkerSpec,
 )
-
-
-class FleetOptions(Request):
-    """Method, workers and limits of a fleet run.
-
-    `workers` processes run on this machine, one for each core if None. With `scheduler`, the
-    address of a Dask scheduler, the work is done there instead. A log may use `time_limit` [s] and
-    `memory_limit` [bytes]. `retry` selects the quarantined logs.
-    """
-
-    method: Method = option("likelihood or paper.", metavar="METHOD", default=DEFAULT_METHOD)
-    quick: bool = flag("Fit one model to each log, and try no other; for a survey of many logs.")
-    workers: int | None = option("Processes on this machine; default: one per core.", minimum=1)
-    scheduler: str | None = option("Work on a Dask cluster, tcp://host:port.", metavar="ADDRESS")
-    time_limit: float = option("Time limit of one log.", unit=SECOND, minimum=0.1, default=600.0)
-    memory_limit: int = option(
-        "Memory limit of one worker.", unit=MEBIBYTE, minimum=64, default=4 * 2**30
-    )
-    attempts: int = option(
-        "Number of attempts for a log that loses its worker.", minimum=1, default=3
-    )
-    retry: bool = flag("Retry the logs in quarantine.")
-    reports: bool = flag("Also write the report of each log.")
-    traces: bool = flag("Also write measured and simulated signals of each log.")
-
 
 _COMMIT_EVERY = 1.0
 """Time [s] between commits of the index. A killed run repeats no more work than this; finished

@@ -34,7 +34,7 @@ from drivetwin.shifts.summary import (
     adjust_comparisons,
     compare_figures,
 )
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 _POINTS = 40
 _LEAST = 5

@@ -31,7 +31,7 @@ from drivetwin.shifts.summary import (
     Trend,
     summarize_shifts,
 )
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 _BESIDE = 3
 """So many shifts beside each other in a table."""

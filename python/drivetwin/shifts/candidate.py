@@ -30,7 +30,7 @@ from drivetwin.shifts.breakaway_lockup import (
 from drivetwin.shifts.kinematics import GearboxSpeeds, is_shared_pressure
 from drivetwin.shifts.shift import Shift, ShiftSettings, classify_shift
 from drivetwin.shifts.tcu_flags import find_flag_start
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

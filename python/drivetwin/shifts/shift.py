@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, Where
 from drivetwin.findings import Code, Finding, report
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.constants import bar, zero_Celsius
 
 from drivetwin._util.arrays import FloatArray, propagate_variance
-from drivetwin._util.version import get_program_version
+from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.estimation.identification import OIL_TEMPERATURE

@@ -15,7 +15,7 @@ from drivetwin.channels.shiftlog import Channel
 from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.select_shifts import select_shifts
 from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
 from tests.support.arrays import FloatArray

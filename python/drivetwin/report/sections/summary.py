@@ -48,7 +48,7 @@ from drivetwin.report.style import get_channel_display, get_channel_label
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.twin.build import list_borrowed_friction
 from drivetwin.validation.simulate_log import EXTRA_SIGNALS, SIGNALS, pool_fits
-from drivetwin.vehicle.ratio_card import ShiftKind
+from drivetwin.vehicle.shift_kind import ShiftKind
 
 Fits = Mapping[str, SignalFit]
 """Fit by phase."""

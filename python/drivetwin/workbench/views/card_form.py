@@ -13,7 +13,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from drivetwin.authoring.question import FormEntry, Key
 from drivetwin.errors import RefusedError
-from drivetwin.vehicle.ratio_card import get_card_field
+from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
