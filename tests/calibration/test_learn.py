@@ -56,6 +56,10 @@ def test_a_correction_finds_the_friction_and_the_engine_torque_of_the_vehicle(
     assert after / before == pytest.approx(TORQUE, abs=0.01)
     assert found.after["output_torque"] < 0.25 * found.before["output_torque"]
     assert found.after["output_torque"] < 1.3 * 15.0  # the noise of the sensor
+    (fit,) = found.fits
+    for one in fit.shift.signals:
+        rms = np.sqrt(np.mean((one.values - fit.after[one.role]) ** 2))
+        assert found.after[one.role] == pytest.approx(rms)
 
 
 def test_the_corrected_twin_has_narrower_intervals_and_only_simulated_values(

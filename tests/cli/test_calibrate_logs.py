@@ -44,6 +44,7 @@ def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(
     page = (second / "report.html").read_text(encoding="utf-8")
     assert "Learned from logs" in page
     assert "gain to expect" in page
+    assert "bench.csv: measured, and predicted before and after the correction." in page
     learned = load_twin(second / "twin.toml")
     ratio = learned.friction["B3"].mu[5] / twin.friction["B3"].mu[5]
     assert ratio == pytest.approx(1.04, abs=0.015)

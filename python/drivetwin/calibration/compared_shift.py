@@ -214,16 +214,17 @@ class ComparedShift:
             signals.append(replace(one, scale=np.minimum(one.scale, scale)))
         return replace(self, signals=tuple(signals))
 
-    def compute_deviations(self, driveline: Driveline, path: InputPath) -> dict[str, FloatArray]:
-        """Return measured minus simulated samples (s,) by signal."""
+    def predict(self, driveline: Driveline, path: InputPath) -> dict[str, FloatArray]:
+        """Return simulated samples (s,) by signal."""
         runs = self.simulate([driveline], [path])
-        pairs = zip(self.signals, runs, strict=True)
-        return {one.role: one.values - one.sample @ values[0] for one, values in pairs}
+        return {
+            one.role: one.sample @ values[0] for one, values in zip(self.signals, runs, strict=True)
+        }
 
     def list_phases(self, driveline: Driveline, path: InputPath) -> list[PhaseDeviation]:
         """List the deviations of all signals by phase."""
         found = []
-        deviations = self.compute_deviations(driveline, path)
+        predicted = self.predict(driveline, path)
         for one in self.signals:
             for name, (begin, end) in self.phases.items():
                 inside = (one.time >= begin) & (one.time <= end)
@@ -236,7 +237,7 @@ class ComparedShift:
                         one.role,
                         name,
                         max(begin, float(one.time[0])),
-                        float(np.sqrt(np.mean(deviations[one.role][inside] ** 2))),
+                        float(np.sqrt(np.mean((one.values - predicted[one.role])[inside] ** 2))),
                         float(np.hypot(one.noise, _EXPLAINED * one.error)),
                     )
                 )

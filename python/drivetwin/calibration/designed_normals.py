@@ -46,6 +46,11 @@ class DesignedNormals(np.random.Generator):
 
 def list_designed(count: int, seed: list[int]) -> list[np.random.Generator]:
     """List the generators of `count` units; a power of two makes the design even."""
-    sobol = qmc.Sobol(_DIMENSIONS, seed=np.random.default_rng(seed))
-    points = sobol.random_base2(max(0, (count - 1).bit_length()))[:count]
-    return [DesignedNormals(row, [*seed, k]) for k, row in enumerate(ndtri(points))]
+    rows = design_normals(count, _DIMENSIONS, np.random.default_rng(seed))
+    return [DesignedNormals(row, [*seed, k]) for k, row in enumerate(rows)]
+
+
+def design_normals(count: int, dimensions: int, random: np.random.Generator) -> FloatArray:
+    """Return designed normal numbers (count, dimensions), scrambled by `random`."""
+    sobol = qmc.Sobol(dimensions, seed=random)
+    return np.asarray(ndtri(sobol.random_base2(max(0, (count - 1).bit_length()))[:count]))

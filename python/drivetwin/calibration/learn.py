@@ -12,7 +12,7 @@ of Mathematical Statistics 35 (1964), for the weights of large deviations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import notify_progress, scale_progress
 from drivetwin.calibration.compared_shift import ComparedShift, PhaseDeviation
+from drivetwin.calibration.designed_normals import design_normals
 from drivetwin.calibration.driven import DrivenShift
 from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.spread import Spread
@@ -47,8 +48,8 @@ from drivetwin.twin.twin import CAPACITY_REFERENCE, Twin
 class LearnSettings:
     """Settings of the search for the likeliest values."""
 
-    draws: int = 250
-    """Draws of a round of the screen [count]."""
+    draws: int = 128
+    """Designed draws of a round of the screen [count]."""
     rounds: int = 3
     """Rounds of the screen while no values explain the logs [count]."""
     starts: int = 2
@@ -73,11 +74,20 @@ LEARN = LearnSettings()
 
 
 @dataclass(frozen=True, eq=False)
+class LoggedFit:
+    """A logged shift with the predicted samples (s,) of its signals by role, before and after."""
+
+    shift: ComparedShift
+    before: Mapping[str, FloatArray]
+    after: Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
 class Correction:
     """Corrected twin; RMS deviations (SI) by signal over all shifts, `before` and `after`.
 
     `values` are what the logs determined. `phases` are the deviations that the corrected twin
-    leaves by signal and phase; `shifts` those that it was corrected by.
+    leaves by signal and phase; `fits` the shifts that it was corrected by.
     """
 
     twin: Twin
@@ -85,7 +95,7 @@ class Correction:
     after: dict[str, float]
     values: tuple[LearnedValue, ...]
     phases: tuple[PhaseDeviation, ...]
-    shifts: tuple[DrivenShift, ...]
+    fits: tuple[LoggedFit, ...]
 
     @property
     def misfits(self) -> tuple[PhaseDeviation, ...]:
@@ -119,13 +129,13 @@ def correct_twin(
     z, found = best.point.values, best.problem
     first = np.maximum(np.zeros(problem.unknowns.count), problem.lower)
     covariance: FloatArray = np.linalg.inv(best.normal.information).astype(np.float64)
+    predicted = problem.predict(first), found.predict(z)
     return Correction(
         found.unknowns.build_twin(z, covariance),
-        _compute_rms(problem.list_deviations(first)),
-        _compute_rms(found.list_deviations(z)),
+        *(_compute_rms(shifts, one) for one in predicted),
         found.unknowns.describe_values(z, covariance),
         tuple(found.list_phases(z)),
-        tuple(one.driven for one in shifts),
+        tuple(map(LoggedFit, shifts, *predicted)),
     )
 
 
@@ -179,10 +189,17 @@ def _find_references(twin: Twin, shifts: Sequence[ComparedShift]) -> dict[str, f
     return {reference: 2.0 * mean} if mean > 0.0 else {}
 
 
-def _compute_rms(deviations: dict[str, list[FloatArray]]) -> dict[str, float]:
+def _compute_rms(
+    shifts: Sequence[ComparedShift], predicted: Sequence[Mapping[str, FloatArray]]
+) -> dict[str, float]:
+    """Compute the RMS of measured minus predicted samples by signal."""
+    deviations: dict[str, list[FloatArray]] = {}
+    for shift, samples in zip(shifts, predicted, strict=True):
+        for one in shift.signals:
+            deviations.setdefault(one.role, []).append(one.values - samples[one.role])
     return {
-        name: float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
-        for name, parts in deviations.items()
+        name: float(np.sqrt(np.mean(np.concatenate(every) ** 2)))
+        for name, every in deviations.items()
     }
 
 
@@ -263,14 +280,10 @@ class LogsObjective:
             found[possible] = rows
         return found
 
-    def list_deviations(self, z: FloatArray) -> dict[str, list[FloatArray]]:
-        """List measured minus simulated samples (s,) of each shift, by signal."""
-        driveline, path = self._build(z)
-        found: dict[str, list[FloatArray]] = {}
-        for shift in self.shifts:
-            for name, values in shift.compute_deviations(driveline, path).items():
-                found.setdefault(name, []).append(values)
-        return found
+    def predict(self, z: FloatArray) -> list[dict[str, FloatArray]]:
+        """Predict the samples (s,) of each shift by signal, from values (m,)."""
+        model = self._build(z)
+        return [shift.predict(*model) for shift in self.shifts]
 
     def list_phases(self, z: FloatArray) -> list[PhaseDeviation]:
         """List the deviations that values (m,) leave, by shift, signal and phase."""
@@ -319,8 +332,8 @@ class _Search:
                 for place, start in enumerate(starts):
                     notify_progress((place + 1) / (len(starts) + 1))
                     self._refine(start)
-            if self.best is not None and self._explains(self.best):
-                break
+                    if self.best is not None and self._explains(self.best):
+                        return self.best
         if self.best is None:
             raise IdentificationError(
                 "the simulation of the logged shifts does not reach its end from any start",
@@ -333,8 +346,8 @@ class _Search:
         return all(one.ratio <= LEARN.misfit for one in every)
 
     def _screen(self, number: int) -> list[FloatArray]:
-        shape, lower = (LEARN.draws, self.problem.unknowns.count), self.problem.lower
-        draws = LEARN.shrinkage**number * self.random.standard_normal(shape)
+        count, lower = self.problem.unknowns.count, self.problem.lower
+        draws = LEARN.shrinkage**number * design_normals(LEARN.draws, count, self.random)
         if number == 0:
             draws[0] = 0.0
             draws = np.where(np.isfinite(lower), np.abs(draws), draws)

@@ -100,7 +100,7 @@ def list_log_findings(found: Correction | None) -> tuple[Finding, ...]:
             Where(file=one.logged.log.source, time=one.logged.shift.before[1]),
             misfit=Number(one.misfit, "Pa"),
         )
-        for one in (() if found is None else found.shifts)
+        for one in (() if found is None else [fit.shift.driven for fit in found.fits])
         if one.profiles is None and one.misfit is not None
     )
 
@@ -147,6 +147,6 @@ def to_correction_document(found: Correction | None) -> dict[str, Any]:
                 }
                 for one in found.values
             },
-            "calibrations": [one.calibration or None for one in found.shifts],
+            "calibrations": [one.shift.driven.calibration or None for one in found.fits],
         }
     }

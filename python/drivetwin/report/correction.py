@@ -3,14 +3,24 @@
 
 from __future__ import annotations
 
-from drivetwin._util.display_units import spell_unit
+from drivetwin._util.display_units import NM, RPM, spell_unit
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.compared_shift import PhaseDeviation
-from drivetwin.calibration.learn import LEARN, Correction
+from drivetwin.calibration.learn import LEARN, Correction, LoggedFit
 from drivetwin.calibration.metrics import Metric
 from drivetwin.channels.roles import get_quantity
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.report.blocks import Block, TableBlock, Tile, TilesBlock, Tone, make_table
+from drivetwin.report.blocks import (
+    Block,
+    FigureBlock,
+    TableBlock,
+    Tile,
+    TilesBlock,
+    Tone,
+    make_table,
+)
+from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.style import MEASURED, MUTED, SIMULATED
 
 _FEWEST_MOVED = 0.01
 """Narrowing of an interval below which the logs say nothing of a value [ratio]."""
@@ -21,7 +31,27 @@ def build_correction_blocks(found: Correction, next_one: Calibration) -> list[Bl
 
     `next_one` is the calibration on the corrected twin, whose start is an earlier one.
     """
-    return [_build_gain(next_one), _build_fit(found), _build_phases(found), _build_values(found)]
+    tables = [_build_fit(found), _build_phases(found), _build_values(found)]
+    return [_build_gain(next_one), *tables, *(_plot_fit(one) for one in found.fits)]
+
+
+def _plot_fit(fit: LoggedFit) -> FigureBlock:
+    """Plot the measured signals of a shift over those predicted before and after the correction."""
+    panels = []
+    for one in fit.shift.signals:
+        drawn = (
+            ("measured", one.values, MEASURED, 1.0),
+            ("predicted before", fit.before[one.role], MUTED, 1.5),
+            ("predicted after", fit.after[one.role], SIMULATED, 1.5),
+        )
+        curves = [Curve(name, one.time, y, colour, width=width) for name, y, colour, width in drawn]
+        display = NM if one.role == "output_torque" else RPM
+        panels.append(Panel(one.role.replace("_", " "), display, curves))
+    figure = plot_over_time_axis(panels, compute_full_range(panels), 640)
+    source = fit.shift.driven.logged.log.source
+    return FigureBlock(
+        figure, f"{source}: measured, and predicted before and after the correction."
+    )
 
 
 def _build_gain(found: Calibration) -> TilesBlock:
