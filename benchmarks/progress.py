@@ -38,7 +38,7 @@ from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.result.method import Method
-from drivetwin.report.html import render_joint_report, render_report
+from drivetwin.report.html import build_joint_page, build_report_page, render_page
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
 from drivetwin.validation.validated_model import ValidatedModel, identify_validated
@@ -123,7 +123,7 @@ class Bench:
 
     def render(self, model: ValidatedModel) -> str:
         """Render the report of the log."""
-        return render_report(model.result, self.source.log)
+        return render_page(build_report_page(model.result, self.source.log))
 
     def identify(self, method: Method) -> ValidatedModel:
         """Identify the log and simulate its shifts, as the command `identify` does."""
@@ -163,7 +163,7 @@ def run_joint(folder: Path) -> Iterator[tuple[str, Timeline]]:
     sources, card = [one.source for one in benches], benches[0].card
     join = partial(_collect, joined, partial(identify_together, sources, card))
     yield "several logs", record_timeline(join)
-    page = partial(render_joint_report, joined[0].found, joined[0].fitted)
+    page = partial(lambda made: render_page(build_joint_page(made.found, made.fitted)), joined[0])
     yield "report of several logs", record_timeline(page)
     bench = make_bench(folder, OPEN)
     task = Task([bench.source], bench.card, tuple(Method))

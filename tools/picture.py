@@ -22,8 +22,8 @@ from drivetwin.fit.fit import fit_network
 from drivetwin.fit.model_file import read_model
 from drivetwin.fit.read import read_recording
 from drivetwin.fit.synthesize import ModelName, read_builtin, synthesize_log
-from drivetwin.report.fit import render_fit
-from drivetwin.report.html import save_report
+from drivetwin.report.fit import build_fit_page
+from drivetwin.report.html import render_page, save_report
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "img"
 WIDTH, HEIGHT = 1000, 960
@@ -56,7 +56,7 @@ def write_fit(folder: Path) -> Path:
     model.write_text(made.model, encoding="utf-8")
     network, channels = read_model(model)
     recording, _ = read_recording(log, network, channels)
-    page = render_fit(fit_network(network, [recording]), [log.name], {})
+    page = render_page(build_fit_page(fit_network(network, [recording]), [log.name], {}))
     path = folder / "fit.html"
     path.write_text(page, encoding="utf-8")
     return path

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.report.comparison import render_comparison, simulate_trials
+from drivetwin.report.comparison import build_comparison_page, simulate_trials
 from drivetwin.report.find_reports import Candidate, compare_estimates
+from drivetwin.report.html import render_page
 from drivetwin.twin.build import build_twin
 from tests.report.sample import SHIFT, card, friction, identification, log
 
@@ -71,9 +72,9 @@ def test_the_page_has_agreement_trials_and_refusals_and_is_escaped() -> None:
     first = make_candidate("first <1>", eta=(0.90, 0.001), k_o=(1e5, 1e3))
     second = make_candidate("second", eta=(0.92, 0.001), k_o=(1.01e5, 1e3))
     pair = [replace(first, friction={"B3": friction()}), second]
-    page = render_comparison(pair, trials)
+    page = render_page(build_comparison_page(pair, trials))
     for anchor in ("agreement", "logs", "shifts", "friction"):
         assert f'id="{anchor}"' in page
     assert "1 of 2 common parameters agree" in page
     assert "first <1>" not in page
-    assert 'id="agreement"' not in render_comparison(pair[:1], trials)
+    assert 'id="agreement"' not in render_page(build_comparison_page(pair[:1], trials))

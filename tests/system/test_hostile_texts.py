@@ -23,7 +23,7 @@ from drivetwin.export.parameters.files import ParameterFormat, read_parameters, 
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from drivetwin.logs.write import write_log
-from drivetwin.report.blocks import FigureBlock, NotesBlock, Section, make_table
+from drivetwin.report.blocks import FigureBlock, NotesBlock, Page, Section, make_table
 from drivetwin.report.figure import Figure
 from drivetwin.report.html import render_page
 from tests.export.cases import paper_subject
@@ -172,7 +172,9 @@ def test_html(text: str) -> None:
         make_table(text, (text,), [(text,)]),
         FigureBlock(figure, text),
     )
-    page = render_page(text, text, [Section("anchor", text, text, blocks)], library="plotly.js")
+    page = render_page(
+        Page(text, text, [Section("anchor", text, text, blocks)]), library="plotly.js"
+    )
     assert not find_hidden(page)
     assert "<script>alert" not in page
     for document in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', page):

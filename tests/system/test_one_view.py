@@ -15,9 +15,9 @@ from drivetwin.drive import load_powertrain, plan_launch, run
 from drivetwin.fit.fit import predict
 from drivetwin.fit.synthesize import ModelName
 from drivetwin.gearbox import load_gearbox
-from drivetwin.report.drive import build_energy_table, build_shift_table, render_drive
-from drivetwin.report.fit import build_fit_blocks, render_fit
-from drivetwin.report.html import render_fragment, render_joint_report, render_report
+from drivetwin.report.drive import build_drive_page, build_energy_table, build_shift_table
+from drivetwin.report.fit import build_fit_blocks, build_fit_page
+from drivetwin.report.html import build_joint_page, build_report_page, render_fragment, render_page
 from drivetwin.report.notebook import build_identification_blocks
 from drivetwin.report.text import format_blocks
 from drivetwin.validation.simulate_log import attach_fit
@@ -35,20 +35,24 @@ Shown = tuple[Sequence[Any], str]
 def identify() -> Shown:
     """One log."""
     found = attach_fit(identification(), [validation()])
-    return build_identification_blocks(found), render_report(found, log())
+    return build_identification_blocks(found), render_page(build_report_page(found, log()))
 
 
 def identify_jointly() -> Shown:
     """Two logs, and a shift that is predicted."""
     made = together()
-    return build_identification_blocks(made.found), render_joint_report(made.found, made.fitted)
+    return build_identification_blocks(made.found), render_page(
+        build_joint_page(made.found, made.fitted)
+    )
 
 
 def fit() -> Shown:
     """A network and a recording that is predicted."""
     found = fit_log(ModelName.ENGINE_START)
     held = {"other.csv": predict(found, [make_log(ModelName.ENGINE_START, 1).recording])[0]}
-    return build_fit_blocks(found, ["k0.csv"], held), render_fit(found, ["k0.csv"], held)
+    return build_fit_blocks(found, ["k0.csv"], held), render_page(
+        build_fit_page(found, ["k0.csv"], held)
+    )
 
 
 def drive() -> Shown:
@@ -56,7 +60,7 @@ def drive() -> Shown:
     box, car = load_gearbox("simpson-3"), load_powertrain("car-350nm")
     motion = run(box, car, plan_launch(box, car.control))
     tables = [build_shift_table(motion), build_energy_table(motion)]
-    return tables, render_drive(motion, "A drive")
+    return tables, render_page(build_drive_page(motion, "A drive"))
 
 
 class Tables(HTMLParser):

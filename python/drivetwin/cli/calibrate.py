@@ -333,7 +333,8 @@ def _write_results(
         write_calibration_file,
     )
     from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.calibration import render_calibration
+    from drivetwin.report.calibration import build_calibration_page
+    from drivetwin.report.html import save_page
 
     (found, front, mapped), (twin, task) = results, origin
     sources = (request.twin, *request.from_logs)
@@ -363,8 +364,8 @@ def _write_results(
                 require_labels(content, template, kind)
             written = show_units(content, kind) if template is None else content
             write_parameters(written, folder / f"calibration.{kind.value}", kind)
-        page = render_calibration(found, f"Calibration of {name}", shown, front, mapped)
-        write_text(folder / REPORT, page)
+        page = build_calibration_page(found, f"Calibration of {name}", shown, front, mapped)
+        save_page(folder / REPORT, page)
         if len(sources) > 1:
             save_twin(folder / TWIN, twin)
         names = sorted(one.name for one in folder.iterdir())

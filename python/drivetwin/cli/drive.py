@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from drivetwin._util.request import Request, argument, option, output_folder
 from drivetwin.cli.arguments import GEARBOX_HELP
 from drivetwin.cli.output import show_step
-from drivetwin.report.blocks import Outcome, TextBlock, Tone, make_notes
+from drivetwin.report.blocks import Outcome, Page, TextBlock, Tone, make_notes
 
 if TYPE_CHECKING:
     from drivetwin.drive import DriveRun
@@ -76,9 +76,12 @@ def drive(request: Drive) -> Outcome:
 def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
     """Write figure and traces, both or none."""
     from drivetwin.cli.output import write_texts
-    from drivetwin.report.drive import format_traces, render_drive
+    from drivetwin.report.drive import build_drive_page, format_traces
 
-    texts = {FIGURE: render_drive(motion, title), TRACES: format_traces(motion)}
+    texts: dict[str, str | Page] = {
+        FIGURE: build_drive_page(motion, title),
+        TRACES: format_traces(motion),
+    }
     return write_texts(folder, texts)
 
 

@@ -52,7 +52,7 @@ def fit_logs(request: Fit) -> tuple[ModelFit, Outcome]:
     from drivetwin.files.fit_file import build_fit_file
     from drivetwin.fit.fit import fit_network, predict
     from drivetwin.fit.model_file import format_model, read_model
-    from drivetwin.report.fit import build_fit_blocks, render_fit
+    from drivetwin.report.fit import build_fit_blocks, build_fit_page
 
     network, channels = read_model(request.model)
     with show_step(f"reading {len(request.logs)} recordings"):
@@ -69,7 +69,7 @@ def fit_logs(request: Fit) -> tuple[ModelFit, Outcome]:
     texts = {FIT_RESULT: file.to_json(), MODEL: format_model(found.fitted, channels)}
     files: Sequence[Path] = ()
     if request.output is not None:
-        files = write_texts(request.output, {**texts, REPORT: render_fit(*shown)})
+        files = write_texts(request.output, {**texts, REPORT: build_fit_page(*shown)})
     blocks = build_fit_blocks(*shown)
     return found, Outcome(blocks, file.to_document(), files, found.status.is_confirmed)
 

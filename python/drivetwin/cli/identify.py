@@ -27,7 +27,7 @@ from drivetwin.cli.output import (
 )
 from drivetwin.errors import DrivetwinError, InputError, Where
 from drivetwin.estimation.likelihood.mechanism import quick
-from drivetwin.report.blocks import Outcome, Tone
+from drivetwin.report.blocks import Outcome, Page, Tone
 
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
@@ -115,7 +115,7 @@ def identify_bus_logs(request: Identify) -> Outcome:
     file = made.build_file(request.describe_settings())
     files: Sequence[Path] = ()
     if request.output is not None:
-        texts = {BUS_RESULT: file.to_json(), REPORT: made.render()}
+        texts: dict[str, str | Page] = {BUS_RESULT: file.to_json(), REPORT: made.build_page()}
         files = write_texts(request.output, texts)
     return Outcome(made.build_blocks(), file.to_document(), files, made.verdict.tone is Tone.GOOD)
 
@@ -195,7 +195,7 @@ def _write_joint(made: JointIdentification, folder: Path) -> tuple[Path, ...]:
     """
     from drivetwin.files.result_file import save_result
     from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.html import save_joint_report
+    from drivetwin.report.html import build_joint_page, save_page
 
     twins = list(made.twins.items())
     named = {TWIN: twins[0][1]}
@@ -205,7 +205,7 @@ def _write_joint(made: JointIdentification, folder: Path) -> tuple[Path, ...]:
         save_result(beside / RESULT, made.found)
         for name, twin in named.items():
             save_twin(beside / name, twin)
-        save_joint_report(beside / REPORT, made.found, made.fitted)
+        save_page(beside / REPORT, build_joint_page(made.found, made.fitted))
     return tuple(folder / name for name in (RESULT, *named, REPORT))
 
 

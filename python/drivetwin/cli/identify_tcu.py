@@ -65,7 +65,8 @@ def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, .
     from drivetwin.cli.output import write_atomically
     from drivetwin.files.tcu_twin_file import save_tcu_twin
     from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.tcu import render_tcu
+    from drivetwin.report.html import save_page
+    from drivetwin.report.tcu import build_tcu_page
     from drivetwin.twin.of_controller import build_shift_twin
 
     kinds = found.twin.kinds if found.status.is_confirmed else ()
@@ -74,6 +75,6 @@ def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, .
         save_tcu_twin(beside / TWIN, found.twin)
         for name, twin in twins.items():
             save_twin(beside / name, twin)
-        for name, text in {TCU_RESULT: result, REPORT: render_tcu(found)}.items():
-            (beside / name).write_text(text, encoding="utf-8", newline="\n")
+        (beside / TCU_RESULT).write_text(result, encoding="utf-8", newline="\n")
+        save_page(beside / REPORT, build_tcu_page(found))
     return tuple(folder / name for name in (TCU_RESULT, TWIN, REPORT, *twins))

@@ -38,10 +38,10 @@ def observe(request: Observe) -> Outcome:
 
     The log needs no output torque; if it has one, it is not used.
     """
-    from drivetwin._util.atomic import write_text
     from drivetwin.files.twin_file import load_twin
     from drivetwin.observer.smooth import estimate_torques
-    from drivetwin.report.observer import build_torque_blocks, render_observations
+    from drivetwin.report.html import save_page
+    from drivetwin.report.observer import build_observer_page, build_torque_blocks
     from drivetwin.shifts.detect import require_shifts
 
     model = load_twin(request.twin)
@@ -53,7 +53,7 @@ def observe(request: Observe) -> Outcome:
     for table in select_outputs(request.output, *LOG_ENDINGS):
         _write_observations(table, found)
     for page in select_outputs(request.output, *PAGE):
-        write_text(page, render_observations(found, recording))
+        save_page(page, build_observer_page(found, recording))
     reasons = [f"Shift {name}: {reason}" for name, reason in left_out.items()]
     blocks = [block for one in found for block in build_torque_blocks(one)]
     return Outcome(

@@ -31,7 +31,7 @@ from drivetwin.findings import Finding
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from drivetwin.report.blocks import Block, Outcome
+    from drivetwin.report.blocks import Block, Outcome, Page
 
 
 def refuse_same_names(files: Sequence[Path], remedy: str) -> None:
@@ -79,11 +79,16 @@ def write_atomically(folder: Path) -> Iterator[Path]:
             shutil.rmtree(beside, ignore_errors=True)
 
 
-def write_texts(folder: Path, texts: Mapping[str, str]) -> tuple[Path, ...]:
-    """Write texts by file name into a folder, all or none; return their paths."""
+def write_texts(folder: Path, texts: Mapping[str, str | Page]) -> tuple[Path, ...]:
+    """Write texts and pages by file name into a folder, all or none; return their paths."""
+    from drivetwin.report.html import save_page
+
     with write_atomically(folder) as beside:
         for name, text in texts.items():
-            (beside / name).write_text(text, encoding="utf-8", newline="\n")
+            if isinstance(text, str):
+                (beside / name).write_text(text, encoding="utf-8", newline="\n")
+            else:
+                save_page(beside / name, text)
     return tuple(folder / name for name in texts)
 
 

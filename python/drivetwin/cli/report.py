@@ -79,7 +79,8 @@ def _find_report(made: MadeResult) -> Outcome:
 def _write_comparison(
     made: Sequence[Path], logs: Sequence[Path], channels: Path | None, output: Path
 ) -> None:
-    from drivetwin.report.comparison import save_comparison
+    from drivetwin.report.comparison import build_comparison_page
+    from drivetwin.report.html import save_page
     from drivetwin.report.results import open_result
 
     with show_step("reading"):
@@ -88,7 +89,7 @@ def _write_comparison(
         twins = {name: one.load_twin() for name, one in opened.items()} if logs else {}
     trials = [trial for log in logs for trial in _simulate_trials(twins, log, channels)]
     with show_step(f"writing {output.name}"):
-        save_comparison(output, candidates, trials)
+        save_page(output, build_comparison_page(candidates, trials))
 
 
 _PLAIN_NAMES = ("result", "bus", "fit", "twin")

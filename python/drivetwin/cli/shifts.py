@@ -122,11 +122,11 @@ def _write_page(
     path: Path, shifts: Sequence[Shift], log: ShiftLog, comparison: Sequence[FigureComparison]
 ) -> None:
     """Write a page with the shift quality of a drive."""
-    from drivetwin._util.atomic import write_text
-    from drivetwin.report.whole_drive import render_whole_drive
+    from drivetwin.report.html import save_page
+    from drivetwin.report.whole_drive import build_whole_drive_page
 
     with show_step(f"writing {path.name}"):
-        write_text(path, render_whole_drive(shifts, log, comparison))
+        save_page(path, build_whole_drive_page(shifts, log, comparison))
 
 
 class _SpeedResults(NamedTuple):

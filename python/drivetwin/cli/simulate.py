@@ -140,7 +140,8 @@ def _simulate_controller(twin: Path, request: Simulate) -> Outcome:
     from drivetwin._util.atomic import write_text
     from drivetwin.files.tcu_twin_file import load_tcu_twin, record_prediction
     from drivetwin.report.blocks import Tone, make_notes
-    from drivetwin.report.tcu import build_prediction_table, render_predictions
+    from drivetwin.report.html import save_page
+    from drivetwin.report.tcu import build_prediction_table, build_predictions_page
     from drivetwin.tcu.log import read_controller_log
     from drivetwin.tcu.outcome import list_unfitted_kinds, predict
 
@@ -154,7 +155,7 @@ def _simulate_controller(twin: Path, request: Simulate) -> Outcome:
     for table in select_outputs(request.output, ".csv"):
         write_text(table, _format_rows(predictions))
     for page in select_outputs(request.output, *PAGE):
-        write_text(page, render_predictions(predictions, log.name))
+        save_page(page, build_predictions_page(predictions, log.name))
     kinds = [
         f"{kind}: no shift of this kind was fitted; its error may be larger than the band."
         for kind in list_unfitted_kinds(model, shifts)
@@ -182,12 +183,12 @@ def _format_rows(predictions: Sequence[PredictedShift]) -> str:
 
 def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
     """Simulate a recording by a fitted model with the start adapted, and write pages."""
-    from drivetwin._util.atomic import write_text
     from drivetwin.cli.fit import read_recordings
     from drivetwin.fit.fit import predict_recording
     from drivetwin.fit.model_file import read_model
     from drivetwin.report.blocks import build_findings_section
-    from drivetwin.report.fit import build_prediction_blocks, render_prediction
+    from drivetwin.report.fit import build_prediction_blocks, build_prediction_page
+    from drivetwin.report.html import save_page
 
     allowed = {"twin", "log", "output"}
     request.refuse_stated(
@@ -203,7 +204,7 @@ def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
         (recording,), findings = read_recordings([request.log], network, channels)
         found = predict_recording(network, made.list_spreads(network), recording)
     for page in select_outputs(request.output, *PAGE):
-        write_text(page, render_prediction(found, network.name, request.log.name))
+        save_page(page, build_prediction_page(found, network.name, request.log.name))
     blocks = [
         *build_prediction_blocks(found, request.log.name),
         *build_findings_section(findings).blocks,
@@ -213,11 +214,12 @@ def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
 
 def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) -> None:
     """Write a page with measurement and simulation of each shift."""
-    from drivetwin.report.comparison import make_trial_label, save_comparison
+    from drivetwin.report.comparison import build_comparison_page, make_trial_label
     from drivetwin.report.find_reports import Candidate, Trial
+    from drivetwin.report.html import save_page
 
     trials = [Trial(make_trial_label(log, run.shift), {twin.name: run}, {}) for run in runs]
-    save_comparison(path, [Candidate.from_twin(twin.name, twin)], trials)
+    save_page(path, build_comparison_page([Candidate.from_twin(twin.name, twin)], trials))
 
 
 def _apply_parameters(twin: Twin, parameters: Path, template: Path | None) -> Twin:

@@ -55,7 +55,7 @@ def try_controller(request: Try) -> Outcome:
     from drivetwin.calibration.trial_comparison import compare_trials
     from drivetwin.cli.calibrate import load_valid_twin
     from drivetwin.files.limits_file import STOCK, load_trials
-    from drivetwin.report.trial import build_trial_blocks, format_junit, render_trials
+    from drivetwin.report.trial import build_trial_blocks, build_trials_page, format_junit
 
     twin, trials = load_valid_twin(request.twin), load_trials(request.scenarios or STOCK)
     found = _run(twin, trials, request, request.controller)
@@ -65,7 +65,7 @@ def try_controller(request: Try) -> Outcome:
     files: Sequence[Path] = ()
     if request.output is not None:
         name = request.controller.stem
-        page = render_trials(found, differences, f"Test of {name}")
+        page = build_trials_page(found, differences, f"Test of {name}")
         files = write_texts(request.output, {JUNIT: format_junit(found, name), REPORT: page})
     states = [
         {

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.atomic import write_bytes, write_text
+from drivetwin._util.atomic import write_bytes
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.read_options import ReadOptions
 from drivetwin.channels.shiftlog import ShiftLog
@@ -47,8 +47,9 @@ from drivetwin.logs.open_mapped import NOTHING_STATED
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.pipeline import identify
+from drivetwin.report.blocks import Page
 from drivetwin.report.bus import BusOutcome, identify_vehicle
-from drivetwin.report.html import render_report, save_library
+from drivetwin.report.html import build_report_page, save_library, save_page
 from drivetwin.shifts.detect import FoundShifts, require_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
@@ -65,19 +66,19 @@ LIBRARY = "plotly.js"
 
 def save_single(path: Path, found: Identification, log: ShiftLog) -> None:
     """Write the report of one log; all reports of a fleet use one library file."""
-    _save_page(path, render_report(found, log, LIBRARY))
+    _save_page(path, build_report_page(found, log))
 
 
 def save_vehicle(path: Path, outcome: BusOutcome) -> None:
     """Write the report of the bus logs of one vehicle."""
-    _save_page(path, outcome.render(LIBRARY))
+    _save_page(path, outcome.build_page())
 
 
-def _save_page(path: Path, text: str) -> None:
+def _save_page(path: Path, page: Page) -> None:
     library = path.with_name(LIBRARY)
     if not library.is_file():
         save_library(library)
-    write_text(path, text)
+    save_page(path, page, LIBRARY)
 
 
 def save_traces(path: Path, found: Identification) -> None:

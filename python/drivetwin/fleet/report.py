@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin._util.atomic import write_text
 from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
 from drivetwin.bus.scatter import METHOD as BUS_METHOD
 from drivetwin.estimation.result.estimate import Z95, Verdict
@@ -39,6 +38,7 @@ from drivetwin.report.blocks import (
     Column,
     FigureBlock,
     NotesBlock,
+    Page,
     Section,
     TableBlock,
     Tile,
@@ -50,7 +50,7 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figures.validation import plot_friction
-from drivetwin.report.html import render_page
+from drivetwin.report.html import save_page
 from drivetwin.report.sections.parameters import TONES, make_parameter_cell
 from drivetwin.report.style import get_parameter_label
 from drivetwin.report.whole_drive import build_comparison_table, get_figure_label
@@ -68,14 +68,13 @@ def save_fleet_report(store: Store, path: Path) -> list[JointEstimate]:
     shared = store.folder / REPORTS / LIBRARY
     folder = path.absolute().parent
     inside = folder == store.folder and shared.is_file()
-    write_text(path, render_fleet(store, found, folder, f"{REPORTS}/{LIBRARY}" if inside else None))
+    page = build_fleet_page(store, found, folder)
+    save_page(path, page, f"{REPORTS}/{LIBRARY}" if inside else None)
     return found
 
 
-def render_fleet(
-    store: Store, found: Sequence[JointEstimate], folder: Path, library: str | None = None
-) -> str:
-    """Return the HTML text of the page; links are relative to `folder`."""
+def build_fleet_page(store: Store, found: Sequence[JointEstimate], folder: Path) -> Page:
+    """Build the page of a fleet; links are relative to `folder`."""
     sections = [
         _build_overview(store),
         build_vehicle_section(store, folder),
@@ -90,11 +89,10 @@ def render_fleet(
     ]
     files = _count(store, "SELECT count(*) FROM files")
     units = _count(store, "SELECT count(DISTINCT unit) FROM files")
-    return render_page(
+    return Page(
         f"Fleet of {units} {'unit' if units == 1 else 'units'}",
         f"{files:,} logs in {store.folder.name}",
-        [section for section in sections if section.blocks],
-        library,
+        sections,
     )
 
 

@@ -146,6 +146,15 @@ class Section:
         return not any(isinstance(one, FigureBlock) for one in self.blocks)
 
 
+@dataclass(frozen=True, eq=False)
+class Page:
+    """Page of a result; sections without blocks are not shown."""
+
+    title: str
+    subtitle: str
+    sections: Sequence[Section]
+
+
 def make_link(shift: Shift) -> str:
     """The `link` of all figures of one shift."""
     return f"{shift.name} at {shift.lockup_time:z.3f} s"

@@ -21,6 +21,7 @@ from drivetwin.findings import Code, Finding, explain
 from drivetwin.report.blocks import (
     Block,
     FigureBlock,
+    Page,
     Section,
     TableBlock,
     Tile,
@@ -32,7 +33,6 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
-from drivetwin.report.html import render_page
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import BAND, MEASURED, OVER, SIMULATED, UNDER, get_parameter_label
 from drivetwin.vehicle.ratio_card import RatioCard
@@ -114,11 +114,11 @@ class BusOutcome:
         ]
         return [one for one in sections if one.blocks]
 
-    def render(self, library: str | None = None) -> str:
-        """Render the report as HTML, with plotly.js inside or in the file `library`."""
+    def build_page(self) -> Page:
+        """Build the report."""
         title = f"Bus logs: {', '.join(self.logs)}"
         subtitle = f"{len(self.logs)} logs · {len(self.found.shifts)} shifts"
-        return render_page(title, subtitle, self.build_sections(), library)
+        return Page(title, subtitle, self.build_sections())
 
 
 def identify_vehicle(

@@ -22,6 +22,7 @@ from drivetwin.report.blocks import (
     Cell,
     Column,
     FigureBlock,
+    Page,
     Section,
     TableBlock,
     TextBlock,
@@ -35,7 +36,6 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figure import Figure, make_trace
-from drivetwin.report.html import render_page
 from drivetwin.report.style import SIMULATED, make_axis, make_layout
 from drivetwin.report.trial import (
     get_metric_display,
@@ -50,14 +50,14 @@ _TONES = {
 }
 
 
-def render_calibration(
+def build_calibration_page(
     found: Calibration,
     title: str,
     shown: tuple[Sequence[Finding], Sequence[Block]],
     front: Front | None = None,
     mapped: OperatingMap | None = None,
-) -> str:
-    """HTML text of the page, with front and map; equal calibrations give equal text.
+) -> Page:
+    """Build the page: with front and map; equal calibrations give equal text.
 
     `shown` are the findings, and the blocks of a correction by logs, empty without one.
     """
@@ -75,7 +75,7 @@ def render_calibration(
     if learned:
         around.insert(0, Section("logs", "Learned from logs", "", learned))
     sections[1:1] = [one for one in around if one.blocks]
-    return render_page(title, subtitle, sections)
+    return Page(title, subtitle, sections)
 
 
 def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Section]:

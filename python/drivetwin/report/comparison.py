@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
-from drivetwin._util.atomic import write_text
 from drivetwin._util.display_units import (
     format_significant,
     get_display_unit,
@@ -22,6 +20,7 @@ from drivetwin.report.blocks import (
     Cell,
     Column,
     FigureBlock,
+    Page,
     Section,
     TableBlock,
     Tile,
@@ -39,7 +38,6 @@ from drivetwin.report.figures.comparison import (
     plot_trial,
 )
 from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
-from drivetwin.report.html import render_page
 from drivetwin.report.sections.parameters import make_estimate_cell, make_value_cell
 from drivetwin.report.sections.summary import build_labelled_fits
 from drivetwin.report.style import get_estimate_label
@@ -48,15 +46,8 @@ from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import SIGNALS, simulate_shift
 
 
-def save_comparison(
-    path: Path | str, candidates: Sequence[Candidate], trials: Sequence[Trial]
-) -> None:
-    """Write the comparison; the file appears whole or not at all."""
-    write_text(path, render_comparison(candidates, trials))
-
-
-def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> str:
-    """HTML text of the comparison; with one candidate it shows the logs alone."""
+def build_comparison_page(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> Page:
+    """Build the page of a comparison; with one candidate it shows the logs alone."""
     several = len(candidates) > 1
     sections = [
         *([build_agreement_section(candidates)] if several else []),
@@ -65,10 +56,10 @@ def render_comparison(candidates: Sequence[Candidate], trials: Sequence[Trial]) 
         build_origin_section(candidates),
     ]
     names = ", ".join(one.name for one in candidates)
-    return render_page(
+    return Page(
         title=f"Comparison of {names}" if several else f"Simulation of {names} over the log",
         subtitle=f"made with drivetwin {get_program_version()}",
-        sections=[section for section in sections if section.blocks],
+        sections=sections,
     )
 
 

@@ -12,10 +12,9 @@ import numpy as np
 from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.channels.roles import make_pressure_role
 from drivetwin.drive.result import TRACE_STEP, DriveRun, Maneuver
-from drivetwin.report.blocks import FigureBlock, Section, TableBlock, make_table
+from drivetwin.report.blocks import FigureBlock, Page, Section, TableBlock, make_table
 from drivetwin.report.figure import Figure, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
-from drivetwin.report.html import render_page
 from drivetwin.report.style import (
     COMPARED,
     MEASURED,
@@ -28,8 +27,8 @@ from drivetwin.report.style import (
 from drivetwin.simulation.dual_clutch import FloatArray
 
 
-def render_drive(run: DriveRun, title: str) -> str:
-    """HTML text of the page; equal drives give equal text."""
+def build_drive_page(run: DriveRun, title: str) -> Page:
+    """Build the page."""
     motion = FigureBlock(plot_motion(run), "Speeds, torques, pedal and pressures.")
     shifts = [
         FigureBlock(
@@ -55,7 +54,7 @@ def render_drive(run: DriveRun, title: str) -> str:
             [FigureBlock(plot_energy(run), "Energy by part, kJ."), build_energy_table(run)],
         ),
     ]
-    return render_page(title, f"{run.time[-1]:.1f} s from standstill", sections)
+    return Page(title, f"{run.time[-1]:.1f} s from standstill", sections)
 
 
 def build_shift_table(run: DriveRun) -> TableBlock:

@@ -26,6 +26,7 @@ from drivetwin.report.blocks import (
     Block,
     Cell,
     FigureBlock,
+    Page,
     Section,
     TableBlock,
     TextBlock,
@@ -35,7 +36,6 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
-from drivetwin.report.html import render_page
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import MEASURED, MUTED, OVER, SIMULATED, UNDER
@@ -53,13 +53,13 @@ _ACTIONS = {
 }
 
 
-def render_fit(
+def build_fit_page(
     found: ModelFit,
     logs: Sequence[str],
     held_out: Mapping[str, HeldOut],
     remarks: Sequence[Finding] = (),
-) -> str:
-    """HTML text of the page; equal fits give equal text."""
+) -> Page:
+    """Build the page."""
     terms = zip(logs, found.problem.terms, found.simulate(), strict=True)
     point = found.minimum.point
     verdict = build_fit_verdict(found.status, found.chi2)
@@ -81,8 +81,7 @@ def render_fit(
         ),
     ]
     subtitle = f"{found.problem.size} samples · Q per sample {found.chi2:.3f}"
-    shown = [one for one in sections if one.blocks]
-    return render_page(f"{found.model.name}: fit of {', '.join(logs)}", subtitle, shown)
+    return Page(f"{found.model.name}: fit of {', '.join(logs)}", subtitle, sections)
 
 
 def build_fit_blocks(
@@ -111,12 +110,12 @@ def build_prediction_blocks(found: HeldOut, log: str) -> list[Block]:
     ]
 
 
-def render_prediction(found: HeldOut, model: str, log: str) -> str:
-    """HTML text of the page of a recording that a fitted model predicts."""
+def build_prediction_page(found: HeldOut, model: str, log: str) -> Page:
+    """Build the page of a recording that a fitted model predicts."""
     figure = plot_recording(found.term, found.point, found.term.build_task(found.point).simulate())
     blocks = [*build_prediction_blocks(found, log), FigureBlock(figure, f"{log}.")]
     section = Section("recordings", "Recording", "Measured and simulated quantities.", blocks)
-    return render_page(f"{model}: simulation of {log}", "by the values of a fit", [section])
+    return Page(f"{model}: simulation of {log}", "by the values of a fit", [section])
 
 
 def build_fit_verdict(status: ModelStatus, chi2: float) -> VerdictBlock:

@@ -31,7 +31,7 @@ from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin._util.text import escape_text, escape_values
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification, Several
-from drivetwin.report.blocks import Block, FigureBlock, Section, build_findings_section
+from drivetwin.report.blocks import Block, FigureBlock, Page, Section, build_findings_section
 from drivetwin.report.figure import Entry, encode_entries
 from drivetwin.report.sections.identifiability import build_limits_section
 from drivetwin.report.sections.parameters import build_result_section
@@ -154,26 +154,25 @@ PAGE = TimedStages("page", ("sections", "figures"))
 @check_arguments
 def save_report(path: Path | str, found: Identification, log: ShiftLog) -> None:
     """Write the report of an identification; the file appears whole or not at all."""
-    write_text(path, render_report(found, log))
+    save_page(path, build_report_page(found, log))
 
 
-def render_report(found: Identification, log: ShiftLog, library: str | None = None) -> str:
-    """HTML text of the report; equal inputs give equal text. `library` as in `render_page`."""
+def build_report_page(found: Identification, log: ShiftLog) -> Page:
+    """Build the report of an identification."""
     with PAGE.enter("sections"):
         sections = build_report_sections(found, log)
     shifts = ", ".join(shift.name for shift in found.shifts)
-    return render_page(
+    return Page(
         title=f"Driveline model from {Path(log.source).name}",
         subtitle=f"shift {shifts} · method {found.method.value} · loss law {found.loss_law}",
         sections=sections,
-        library=library,
     )
 
 
 def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]:
-    """All sections in reading order; those without content are left out."""
+    """All sections in reading order; some may be without content."""
     stages = build_stage_sections(found)
-    sections = [
+    return [
         build_result_section(found),
         build_findings_section(found.findings),
         build_validation_section(found.evidence.validation),
@@ -186,7 +185,6 @@ def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]
         build_provenance_section(found),
         *(one for one in stages if one.collapsed),
     ]
-    return [section for section in sections if section.blocks]
 
 
 def _build_likelihood_sections(found: Identification) -> list[Section]:
@@ -198,13 +196,8 @@ def _build_likelihood_sections(found: Identification) -> list[Section]:
     return build_likelihood_sections(found)
 
 
-def save_joint_report(path: Path | str, found: Identification, logs: Sequence[ShiftLog]) -> None:
-    """Write the report; the file appears whole or not at all. `logs` are those fitted, in order."""
-    write_text(path, render_joint_report(found, logs))
-
-
-def render_joint_report(found: Identification, logs: Sequence[ShiftLog]) -> str:
-    """HTML text of the report; equal inputs give equal text."""
+def build_joint_page(found: Identification, logs: Sequence[ShiftLog]) -> Page:
+    """Build the report of a joint identification; `logs` are those fitted, in order."""
     several = found.evidence.several
     held = found.evidence.held_out
     with PAGE.enter("sections"):
@@ -217,14 +210,14 @@ def render_joint_report(found: Identification, logs: Sequence[ShiftLog]) -> str:
         sections.insert(place, build_holdout_section(found, held))
     names = " and ".join(Path(log.source).name for log in logs)
     predicted = f" · {_format_shift_count(len(held))} predicted" if held else ""
-    return render_page(
+    return Page(
         title=f"Driveline model from {names}",
         subtitle=(
             f"{_format_shift_count(len(found.shifts))} fitted{predicted} · method "
             f"{found.method.value} · "
             f"loss law {found.loss_law}"
         ),
-        sections=[section for section in sections if section.blocks],
+        sections=sections,
     )
 
 
@@ -252,15 +245,19 @@ def _build_joint_sections(
     yield build_provenance_section(found)
 
 
-def render_page(
-    title: str, subtitle: str, sections: list[Section], library: str | None = None
-) -> str:
-    """Fill the page template; figures become JSON that the page's script draws.
+def save_page(path: Path | str, page: Page, library: str | None = None) -> None:
+    """Write a page; the file appears whole or not at all. `library` as in `render_page`."""
+    write_text(path, render_page(page, library))
 
-    The samples of figures over time stand once, packed, at the end of the page. So does plotly.js,
-    unless `library` names a file of `save_library` beside the page, which many pages can share.
+
+def render_page(page: Page, library: str | None = None) -> str:
+    """Fill the page template; equal pages give equal text.
+
+    Figures become JSON that the script of the page draws. The samples of figures over time stand
+    once, packed, at the end of the page. So does plotly.js, unless `library` names a file of
+    `save_library` beside the page, which many pages can share.
     """
-    store = Store()
+    store, sections = Store(), [one for one in page.sections if one.blocks]
     figures = sum(isinstance(block, FigureBlock) for one in sections for block in one.blocks)
     drawn = count(1)
 
@@ -273,8 +270,8 @@ def render_page(
             _make_environment(as_json)
             .get_template("report.html.j2")
             .render(
-                title=title,
-                subtitle=subtitle,
+                title=page.title,
+                subtitle=page.subtitle,
                 sections=sections,
                 style=read_template("status.css") + read_template("report.css"),
                 script=read_template("report.js"),

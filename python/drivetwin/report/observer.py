@@ -9,18 +9,17 @@ from pathlib import Path
 from drivetwin._util.display_units import NM
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.observer.result import Band, FloatArray, Observation
-from drivetwin.report.blocks import Block, FigureBlock, Section, make_notes, make_table
+from drivetwin.report.blocks import Block, FigureBlock, Page, Section, make_notes, make_table
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
-from drivetwin.report.html import render_page
 from drivetwin.report.style import MEASURED, SIMULATED
 from drivetwin.validation.simulate_log import clip_phases
 
 
-def render_observations(found: Sequence[Observation], log: ShiftLog) -> str:
-    """HTML text of the page; equal observations give equal text."""
+def build_observer_page(found: Sequence[Observation], log: ShiftLog) -> Page:
+    """Build the page."""
     sections = [_build_section(number, one, log) for number, one in enumerate(found, start=1)]
     title = f"Torques observed in {Path(log.source).name}"
-    return render_page(title, "from speeds and engine torque, with 95 % bands", sections)
+    return Page(title, "from speeds and engine torque, with 95 % bands", sections)
 
 
 def _build_section(number: int, one: Observation, log: ShiftLog) -> Section:

@@ -11,6 +11,7 @@ from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.report.blocks import (
     Block,
     FigureBlock,
+    Page,
     Section,
     TableBlock,
     Tone,
@@ -20,7 +21,6 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
-from drivetwin.report.html import render_page
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
 from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.report.style import BAND, MEASURED, OVER, SIMULATED, UNDER
@@ -38,18 +38,18 @@ _ACTIONS = {
 }
 
 
-def render_tcu(found: TcuIdentification) -> str:
-    """HTML text of the page; equal results give equal text."""
+def build_tcu_page(found: TcuIdentification) -> Page:
+    """Build the page."""
     names = ", ".join(Path(one.source).name for one in found.logs)
     shown = len(found.found.shifts), len(found.predictions)
     subtitle = f"{shown[0]} shifts fitted · {shown[1]} held out"
-    return render_page(f"Gearbox control: {names}", subtitle, build_tcu_sections(found))
+    return Page(f"Gearbox control: {names}", subtitle, build_tcu_sections(found))
 
 
-def render_predictions(predictions: Sequence[PredictedShift], log: str) -> str:
-    """HTML text of the page of predicted shifts of a log."""
+def build_predictions_page(predictions: Sequence[PredictedShift], log: str) -> Page:
+    """Build the page of predicted shifts of a log."""
     blocks = [build_prediction_table(predictions), *build_prediction_figures(predictions)]
-    return render_page(f"Predicted shifts: {log}", "", [Section("shifts", "Shifts", "", blocks)])
+    return Page(f"Predicted shifts: {log}", "", [Section("shifts", "Shifts", "", blocks)])
 
 
 def build_tcu_sections(found: TcuIdentification) -> list[Section]:

@@ -21,6 +21,7 @@ from drivetwin.calibration.trial_comparison import Difference
 from drivetwin.report.blocks import (
     Block,
     FigureBlock,
+    Page,
     Section,
     TableBlock,
     Tone,
@@ -30,7 +31,6 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figure import Entry, Figure, make_subplots, make_trace
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
-from drivetwin.report.html import render_page
 from drivetwin.report.style import ACCENT, MEASURED, MUTED, SIMULATED, make_axis, make_layout
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output
@@ -185,8 +185,10 @@ def build_trial_blocks(found: Sequence[Trial], differences: Sequence[Difference]
     ]
 
 
-def render_trials(found: Sequence[Trial], differences: Sequence[Difference], title: str) -> str:
-    """Return the HTML text of the page; failed scenarios come first among the worst runs."""
+def build_trials_page(
+    found: Sequence[Trial], differences: Sequence[Difference], title: str
+) -> Page:
+    """Build the page; failed scenarios come first among the worst runs."""
     runs = [
         FigureBlock(_plot_run(one.worst), f"{one.scenario.name}: run {one.place}")
         for one in sorted(found, key=lambda one: not one.failed)
@@ -200,7 +202,7 @@ def render_trials(found: Sequence[Trial], differences: Sequence[Difference], tit
         Section("result", "Result", "", build_trial_blocks(found, differences)),
         Section("runs", "Worst runs", intro, runs[:_SHOWN]),
     ]
-    return render_page(title, "", sections)
+    return Page(title, "", sections)
 
 
 def format_junit(found: Sequence[Trial], name: str) -> str:

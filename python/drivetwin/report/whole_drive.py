@@ -12,6 +12,7 @@ from drivetwin.report.blocks import (
     Cell,
     Column,
     FigureBlock,
+    Page,
     Section,
     TableBlock,
     make_number,
@@ -19,7 +20,6 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figure import Figure
 from drivetwin.report.figures.validation import plot_shift_phases
-from drivetwin.report.html import render_page
 from drivetwin.report.style import get_candidate_style, make_axis, make_layout
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
@@ -37,10 +37,10 @@ _BESIDE = 3
 """So many shifts beside each other in a table."""
 
 
-def render_whole_drive(
+def build_whole_drive_page(
     shifts: Sequence[Shift], log: ShiftLog, comparison: Sequence[FigureComparison] = ()
-) -> str:
-    """HTML text of the page: each summarised figure of shift quality, and outlying shifts.
+) -> Page:
+    """Build the page: each summarised figure of shift quality, and outlying shifts.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def render_whole_drive(
         text = "Shifts of the same kind and gears in both."
         table = build_comparison_table(comparison)
         sections.append(Section("comparison", "Comparison", text, [table]))
-    return render_page(
+    return Page(
         title=f"Shifts of {Path(log.source).name}",
         subtitle=f"{len(shifts)} shifts from {shifts[0].lockup_time:z.1f} to "
         f"{shifts[-1].lockup_time:z.1f} s",

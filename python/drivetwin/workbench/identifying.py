@@ -251,14 +251,15 @@ def identify_bus_logs(emit: Emit, task: BusTask) -> None:
 
 def render_bus_report(emit: Emit, outcome: BusOutcome) -> None:
     """Emit the report of bus logs as HTML."""
-    emit(outcome.render())
+    from drivetwin.report.html import render_page
+
+    emit(render_page(outcome.build_page()))
 
 
 def render_log_report(emit: Emit, found: Identification, logs: Sequence[ShiftLog]) -> None:
     """Emit the report of an identification as HTML; `logs` are those fitted, in order."""
-    from drivetwin.report.html import render_joint_report, render_report
+    from drivetwin.report.html import build_joint_page, build_report_page, render_page
 
-    if len(logs) == 1 and not found.evidence.held_out:
-        emit(render_report(found, logs[0]))
-    else:
-        emit(render_joint_report(found, logs))
+    is_single = len(logs) == 1 and not found.evidence.held_out
+    page = build_report_page(found, logs[0]) if is_single else build_joint_page(found, logs)
+    emit(render_page(page))

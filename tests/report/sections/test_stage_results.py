@@ -14,7 +14,7 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.report.blocks import FigureBlock, NotesBlock, Section, TableBlock, Tone
-from drivetwin.report.html import render_report
+from drivetwin.report.html import build_report_page, render_page
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
@@ -85,7 +85,7 @@ def test_a_refused_stage_says_why(given: tuple[Identification, ShiftLog]) -> Non
 
 
 def test_report_of_a_whole_log_stays_small(given: tuple[Identification, ShiftLog]) -> None:
-    assert len(render_report(*given).encode()) < 3_000_000
+    assert len(render_page(build_report_page(*given)).encode()) < 3_000_000
 
 
 def test_without_evidence_nothing_is_drawn() -> None:
