@@ -185,6 +185,8 @@ class Code(StrEnum):
     OPTIONS_REMEMBERED = auto()
     BUS_ONE_SHIFT = auto()
     BUS_SHIFTS_CONTRADICT = auto()
+    BUS_SCATTERS = auto()
+    BUS_KINDS_DIFFER = auto()
     BUS_START_NOT_SEEN = auto()
     BUS_END_NOT_SEEN = auto()
     BUS_RATIO_DIFFERS = auto()

@@ -92,6 +92,7 @@ def test_the_others_predict_the_decay_left_out(held: int) -> None:
     assert len(found.predictions) == 1
     for one in found.predictions.values():
         assert one.share_inside >= 0.85
+        assert one.error < one.trend_alone
 
 
 def test_the_automated_clutch_has_named_phases() -> None:

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from drivetwin.bus.scatter import ShiftValue, combine
-from drivetwin.estimation.result.estimate import Z95
+from drivetwin.bus.scatter import ShiftValue, combine, make_estimate
+from drivetwin.estimation.result.estimate import Z95, Verdict
 
 
 def draw(rng: np.random.Generator, tau: float, count: int = 8) -> list[ShiftValue]:
@@ -49,6 +51,24 @@ def test_a_shift_that_differs_is_named() -> None:
     assert found is not None
     assert found.contradicting == ("odd",)
     assert found.p_value < 0.01
+
+
+def test_kinds_that_differ_are_compared_within_themselves() -> None:
+    rng = np.random.default_rng(3)
+    far = np.array([20.0, 0.0])
+    ends = [replace(one, kind="up", label=f"up {one.label}") for one in draw(rng, 0.0)]
+    ends += [replace(one, kind="down", value=one.value + far) for one in draw(rng, 0.0, count=4)]
+    found = combine(ends)
+    assert found is not None
+    assert found.p_value < 1e-6
+    assert not found.contradicting
+    apart = found.groups["down"].value - found.groups["up"].value
+    assert apart == pytest.approx([20.0, 0.0], abs=3.0)
+    estimate = make_estimate("ratio", "1", 2.0, 0.001, found)
+    assert estimate.verdict is Verdict.WEAK
+    alike = combine([replace(one, value=np.array([3.0, -1.0])) for one in ends])
+    assert alike is not None
+    assert not alike.groups
 
 
 def test_shifts_that_determine_one_direction_each_complete_one_another() -> None:

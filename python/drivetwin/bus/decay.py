@@ -81,7 +81,8 @@ class DecayRecord:
 
     `label` names log and shift, `start` [s] is the first sample in the time of the log. `floor`
     [rad/s] is the standard deviation of rounding. An engine `torque`, `late` [s], drives both the
-    trend and the oscillation where it is recorded.
+    trend and the oscillation where it is recorded. `kind` is "upshifts" or "downshifts", empty
+    where the gear before is not known.
     """
 
     label: str
@@ -91,6 +92,7 @@ class DecayRecord:
     floor: float
     torque: Signal | None = None
     late: float = 0.0
+    kind: str = ""
     averaged: FloatArray | None = None
     """Times (n, w) [s] of the samples of each mean, None where each value is one sample."""
 
@@ -244,7 +246,7 @@ def _find_own(one: DecayRecord, swing: Swing, size: NoiseSize) -> ShiftValue:
         swing = _move(swing, step)
         if float(step @ information @ step) < DECAY.converged**2:
             break
-    return ShiftValue(one.label, np.array([swing.rate, swing.omega]), information)
+    return ShiftValue(one.label, np.array([swing.rate, swing.omega]), information, one.kind)
 
 
 def _fit_size(one: DecayRecord, swing: Swing, start: NoiseSize | None) -> NoiseSize:
@@ -380,6 +382,32 @@ class DecayPrediction:
         k = self.predicted
         far = np.abs(self.record.values[k] - self.mean[k]) <= Z95 * self.std[k]
         return float(np.mean(far))
+
+    @property
+    def error(self) -> float:
+        """Root mean square error of the predicted samples [rad/s]."""
+        k = self.predicted
+        return _compute_rms(self.record.values[k] - self.mean[k])
+
+    @property
+    def oscillation(self) -> float:
+        """Root mean square of the predicted samples about their own line [rad/s]."""
+        return self._leave_line(self.predicted)
+
+    @property
+    def trend_alone(self) -> float:
+        """Root mean square error of the line through the first samples [rad/s]."""
+        return self._leave_line(np.arange(self.used))
+
+    def _leave_line(self, through: NDArray[np.intp]) -> float:
+        """Compute the deviation of the predicted samples from the line through some samples."""
+        time, values, k = self.record.time, self.record.values, self.predicted
+        line = np.polyfit(time[through], values[through], 1)
+        return _compute_rms(values[k] - np.polyval(line, time[k]))
+
+
+def _compute_rms(error: FloatArray) -> float:
+    return float(np.sqrt(np.mean(error**2)))
 
 
 def predict_decay(joint: JointDecay, record: DecayRecord, periods: float = 1.0) -> DecayPrediction:

@@ -121,10 +121,10 @@ def identify_bus(
     made = _ResultBuilder(ratios, card, [] if card is None else find_unknown_ratios(bus, card))
     made.findings += remarks
     made.add_alignment(aligned)
-    made.add_decays(_collect_decays(timelines))
+    made.add_decays(_collect_decays(timelines, ratios))
     dead = find_dead_time(timelines, ratios, late, made.decays)
     if dead is not None:  # the torque drives the oscillation of the decays too
-        made.add_decays(_collect_decays(timelines, dead))
+        made.add_decays(_collect_decays(timelines, ratios, dead))
     torques = estimate_torques(timelines, ratios, late, made.decays, card)
     made.report_decays()
     made.estimates |= torques.estimates
@@ -134,7 +134,7 @@ def identify_bus(
     made.findings += [one for line in timelines for one in find_limits(line)]
     predictions: dict[str, DecayPrediction] = {}
     for line in (find_timeline(one, ratios, late) for one in others):
-        for gear, each in _collect_decays([line], dead).items():
+        for gear, each in _collect_decays([line], ratios, dead).items():
             if gear in made.decays:
                 predictions |= made.predict(made.decays[gear], each)
     return BusIdentification(
@@ -204,7 +204,7 @@ def _list_joined(lines: Sequence[Timeline], role: str, margin: float) -> Iterato
 
 
 def _collect_decays(
-    lines: Sequence[Timeline], dead: float | None = None
+    lines: Sequence[Timeline], ratios: Mapping[str, float], dead: float | None = None
 ) -> dict[str, list[DecayRecord]]:
     """Samples of the input speed after each lock-up, by gear.
 
@@ -228,7 +228,10 @@ def _collect_decays(
             if time.size < RING_DOWN.min_samples:
                 continue
             label = f"{line.log.label}, {shift.label}"
-            record = DecayRecord(label, float(time[0]), time - time[0], values, inlet.floor)
+            kind = _name_kind(ratios.get(shift.start_gear), ratios[shift.end_gear])
+            record = DecayRecord(
+                label, float(time[0]), time - time[0], values, inlet.floor, kind=kind
+            )
             torque = line.log.signals.get("engine_torque")
             if dead is not None and torque is not None:
                 span = (float(time[0]) + dead, float(time[-1]) + dead)
@@ -254,6 +257,22 @@ def find_contradictions(quantity: str, combined: Combined) -> Iterator[Finding]:
     for shift in combined.contradicting:
         p = combined.p_values[shift]
         yield report(Code.BUS_SHIFTS_CONTRADICT, shift=shift, quantity=quantity, p=p)
+
+
+def _name_kind(before: float | None, after: float) -> str:
+    """Name the kind of a shift by the ratios; empty where that before is not known."""
+    if before is None:
+        return ""
+    return "upshifts" if before > after else "downshifts"
+
+
+def _report_kinds(gear: str, joint: JointDecay) -> Finding:
+    """Report that the resonance after upshifts differs from that after downshifts."""
+    found = {}
+    for kind, one in joint.combined.groups.items():
+        value, std = replace(joint, combined=one).compute_frequency()
+        found[kind] = Number(value, "Hz", Z95 * std)
+    return report(Code.BUS_KINDS_DIFFER, gear=gear, **found)
 
 
 class _ResultBuilder:
@@ -344,6 +363,8 @@ class _ResultBuilder:
                 one = make_estimate(stem, gear, value, std, joint.combined, text)
                 self.estimates[one.id] = one
             self.findings += find_contradictions(f"the resonance in gear {gear}", joint.combined)
+            if joint.combined.groups:
+                self.findings.append(_report_kinds(gear, joint))
 
 
 def find_unknown_ratios(logs: Iterable[BusLog], card: RatioCard) -> list[HeldRatio]:

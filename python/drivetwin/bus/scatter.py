@@ -14,7 +14,7 @@ degrees of freedom of an interval are those of T, as far as T contributes (Satte
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +38,13 @@ _SMALLEST = 1e-12
 class ShiftValue:
     """Estimate (p,) of one shift with its information (p, p): inverse covariance, maybe singular.
 
-    `label` names log and shift.
+    `label` names log and shift, `kind` its kind; empty where it is not known.
     """
 
     label: str
     value: FloatArray
     information: FloatArray
+    kind: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +54,8 @@ class Combined:
     `covariance` (p, p) includes the scatter `tau` (p,) between the shifts (one standard deviation).
     `freedom` (p,) are the degrees of freedom of the intervals. `p_values` by label are those of the
     tests that a shift agrees with the others, scatter left out; `p_value` is that of all together.
+    `groups` are the values by kind of shift where they differ: a shift is then compared with those
+    of its kind.
     """
 
     value: FloatArray
@@ -62,6 +65,7 @@ class Combined:
     count: int
     p_value: float
     p_values: dict[str, float]
+    groups: dict[str, Combined] = field(default_factory=dict)
 
     @property
     def std(self) -> FloatArray:
@@ -106,7 +110,10 @@ def combine(
     within = _average(values, infos, np.zeros_like(tau), extra)[1]
     between = np.maximum(np.diag(covariance) - np.diag(within), 0.0) / np.diag(covariance)
     freedom = max(len(used) - 1, 1) / np.maximum(between, 1e-9) ** 2
+    groups = _split(used)
     p_value, p_values = _test_agreement(used, values, infos, extra)
+    for each in groups.values():
+        p_values |= each.p_values
     return Combined(
         origin + mean * scale,
         covariance * np.outer(scale, scale),
@@ -115,7 +122,24 @@ def combine(
         len(used),
         p_value,
         p_values,
+        groups,
     )
+
+
+def _split(used: Sequence[ShiftValue]) -> dict[str, Combined]:
+    """Combine the shifts of two kinds separately; empty where the kinds agree."""
+    parts: dict[str, list[ShiftValue]] = {}
+    for one in used:
+        if one.kind:
+            parts.setdefault(one.kind, []).append(replace(one, kind=""))
+    found = {kind: combine(part) for kind, part in parts.items() if len(part) > 1}
+    known = {kind: one for kind, one in found.items() if one is not None}
+    if len(known) != 2:
+        return {}
+    first, second = known.values()
+    apart = first.value - second.value
+    far = apart @ np.linalg.solve(first.covariance + second.covariance, apart)
+    return known if chdtrc(apart.size, far) < CONTRADICTION else {}
 
 
 def _choose_scale(used: Sequence[ShiftValue]) -> FloatArray:
@@ -256,13 +280,15 @@ def make_id(stem: str, suffix: str = "") -> str:
 def make_estimate(
     stem: str, suffix: str, value: float, std: float, combined: Combined, note: str = ""
 ) -> Estimate:
-    """Estimate with a verdict from the interval; from one shift alone, it is weak at best."""
+    """Estimate with a verdict from the interval; it is weak at best from one shift alone, and where
+    the shifts contradict each other."""
     name = make_id(stem, suffix)
     found = assess(name, value, std, METHOD, note=note, spec=get_spec(stem, suffix))
-    if combined.count > 1 or found.verdict is Verdict.NOT_IDENTIFIABLE:
+    p, is_single = combined.p_value, combined.count == 1
+    if found.verdict is Verdict.NOT_IDENTIFIABLE or not (is_single or p < CONTRADICTION):
         return found
-    reason = join_reasons(explain(Code.BUS_ONE_SHIFT), found.reason)
-    return replace(found, verdict=Verdict.WEAK, reason=reason)
+    cause = explain(Code.BUS_ONE_SHIFT) if is_single else explain(Code.BUS_SCATTERS, p=p)
+    return replace(found, verdict=Verdict.WEAK, reason=join_reasons(cause, found.reason))
 
 
 def refuse(stem: str, suffix: str, reason: str) -> Estimate:

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Self
 
 from pydantic import Field, FiniteFloat
 
 from drivetwin._util.optional_dependencies import get_program_version
+from drivetwin.bus.decay import DecayPrediction
 from drivetwin.bus.identify import BusIdentification
 from drivetwin.bus.phases import BusShift
 from drivetwin.files.records import (
@@ -56,11 +58,25 @@ class BusDecayRecord(Record):
 
 
 class BusPredictionRecord(Record):
-    """Decay that took no part: share of its predicted samples inside the 95 % band."""
+    """Decay that took no part: share of its predicted samples inside the 95 % band.
+
+    `error` [rad/s] is that of the prediction, `trend_alone` that of the line through the samples
+    before it, `oscillation` the root mean square of the samples about their own line.
+    """
 
     shift: str
     samples: int
     inside: FiniteFloat
+    error: FiniteFloat
+    oscillation: FiniteFloat
+    trend_alone: FiniteFloat
+
+    @classmethod
+    def from_prediction(cls, shift: str, one: DecayPrediction) -> Self:
+        """Record a prediction."""
+        names = ("error", "oscillation", "trend_alone")
+        sizes = {name: getattr(one, name) for name in names}
+        return cls(shift=shift, samples=one.predicted.size, inside=one.share_inside, **sizes)
 
 
 class BusEnergyRecord(Record):
@@ -127,7 +143,7 @@ def build_bus_file(
             for gear, one in found.decays.items()
         },
         predictions=[
-            BusPredictionRecord(shift=name, samples=one.predicted.size, inside=one.share_inside)
+            BusPredictionRecord.from_prediction(name, one)
             for name, one in found.predictions.items()
         ],
         energies=[

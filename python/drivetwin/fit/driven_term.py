@@ -21,7 +21,7 @@ from drivetwin.estimation.likelihood.noise.residual_covariance import (
     build_sensor_whitener,
 )
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.optimize.objective import ParameterVector, place_columns
 from drivetwin.fit.input_path import InputPath
 from drivetwin.fit.plant import Plant
 from drivetwin.simulation.dual_clutch import Signal
@@ -222,8 +222,7 @@ class DrivenTerm:
             slopes[:, self.names.index(name)] += (there - simulated) / _STEP
         if not np.all(np.isfinite(slopes)):
             return None
-        every = np.zeros((simulated.size, len(point.names)), order="F")
-        every[:, self._find_places(point)] = slopes
+        every = place_columns(slopes, self._find_places(point), len(point.names))
         return self.record.measured - simulated, every
 
     @cached_property

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from drivetwin._util.display_units import RPM, format_uncertainty
 from drivetwin.bus.decay import DecayPrediction, JointDecay
@@ -16,7 +14,7 @@ from drivetwin.bus.phases import Timeline
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
-from drivetwin.files.bus_file import BusFile, build_bus_file
+from drivetwin.files.bus_file import BusFile, BusPredictionRecord, build_bus_file
 from drivetwin.findings import Code, Finding, explain
 from drivetwin.report.blocks import (
     Block,
@@ -54,8 +52,8 @@ class BusOutcome:
     @property
     def verdict(self) -> VerdictBlock:
         """Verdict on the quantities."""
-        inside = [one.share_inside for one in self.found.predictions.values()]
-        return explain_bus(self.found.estimates, self.found.findings, inside)
+        found = self.found
+        return explain_bus(found.estimates, found.findings, found.predictions.values())
 
     def build_file(self, settings: Mapping[str, str] | None = None) -> BusFile:
         """Build the result file with the settings of the run."""
@@ -148,10 +146,12 @@ def identify_vehicle(
 
 
 def explain_bus(
-    estimates: Mapping[str, Estimate], findings: Sequence[Finding], inside: Sequence[float]
+    estimates: Mapping[str, Estimate],
+    findings: Sequence[Finding],
+    predictions: Iterable[DecayPrediction | BusPredictionRecord],
 ) -> VerdictBlock:
     """Build the verdict on a result, good if some quantities are identified and no shift
-    contradicts the others; `inside` are the shares of predicted samples inside the 95 % band."""
+    contradicts the others. A prediction that is no better than the trend alone is no test."""
     verdicts = [one.verdict for one in estimates.values()]
     count = verdicts.count(Verdict.IDENTIFIED)
     status = f"{count} of {len(verdicts)} quantities identified"
@@ -162,10 +162,11 @@ def explain_bus(
         action, tone = worst.remedy, Tone.DOUBTFUL
     else:
         reason, action, tone = _explain_agreement(estimates, count)
-    if inside:
+    better = [one.error < one.trend_alone for one in predictions]
+    if better:
         reason += (
-            f" {len(inside)} held-out decays were predicted: {100.0 * float(np.mean(inside)):.0f} "
-            "% of their samples are inside the 95 % band."
+            f" {sum(better)} of {len(better)} predicted held-out decays have a smaller error than "
+            "the trend alone."
         )
     return VerdictBlock(status, reason, action, tone, "Bus logs")
 
@@ -304,9 +305,10 @@ def _build_prediction_table(found: BusIdentification) -> Iterator[Block]:
             name,
             one.predicted.size,
             100.0 * one.share_inside,
-            float(np.median(Z95 * one.std[one.predicted])) * RPM.factor,
+            *(each * RPM.factor for each in (one.error, one.oscillation, one.trend_alone)),
         )
         for name, one in found.predictions.items()
     ]
-    columns = ("decay", ("samples", "d"), ("inside band %", ".1f"), ("half width rpm", "3"))
+    sizes = (("error rpm", "3"), ("oscillation rpm", "3"), ("trend alone rpm", "3"))
+    columns = ("decay", ("samples", "d"), ("inside band %", ".1f"), *sizes)
     yield make_table("Prediction of held-out decays by the others", columns, rows)

@@ -121,8 +121,7 @@ class MadeResult:
                 return explain_tcu(tcu.status, tcu.reason)
             case BusFile() as bus:
                 findings = [one.to_finding() for one in bus.findings]
-                inside = [one.inside for one in bus.predictions]
-                return explain_bus(self.estimates, findings, inside)
+                return explain_bus(self.estimates, findings, bus.predictions)
             case content:
                 return build_verdict_block(explain_result(content))
 

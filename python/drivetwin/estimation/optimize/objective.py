@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from mmap import mmap
 from typing import Protocol
 
 import numpy as np
@@ -49,6 +50,10 @@ class _VariableVector(ParameterVector):
         return Variable(float(self.values[place]), slopes)
 
 
+_MAPPED = 1 << 20
+"""Size from which columns are mapped [bytes]."""
+
+
 def find_acting(columns: FloatArray) -> NDArray[np.intp]:
     """Return the numbers of the `columns` (n, p) that are not zero throughout.
 
@@ -61,9 +66,14 @@ def place_columns(acting: FloatArray, index: NDArray[np.intp], count: int) -> Fl
     """Return `count` columns (n, count), zero but for those `acting` (n, k) at the places `index`
     (k,).
 
-    Each is contiguous, so that the system assigns no memory to the zeros.
+    Each is contiguous, so that the system assigns no memory to the zeros. Large ones are mapped:
+    the allocator writes zeros into memory that was in use before.
     """
-    found = np.zeros((len(acting), count), order="F")
+    shape = (len(acting), count)
+    if 8 * len(acting) * count < _MAPPED:
+        found = np.zeros(shape, order="F")
+    else:
+        found = np.ndarray(shape, buffer=mmap(-1, 8 * shape[0] * shape[1]), order="F")
     found[:, index] = acting
     return found
 
