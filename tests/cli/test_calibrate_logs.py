@@ -42,9 +42,8 @@ def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(
     gain = found["correction"]["learned"]["mu.B3"]
     assert gain["after_std"] < 0.5 * gain["before_std"]
     page = (second / "report.html").read_text(encoding="utf-8")
-    assert "Learned from logs" in page
-    assert "gain to expect" in page
-    assert "bench.csv: measured, and predicted before and after the correction." in page
+    figure = "bench.csv: measured, and predicted before and after the correction."
+    assert all(text in page for text in ("Learned from logs", "gain to expect", figure))
     learned = load_twin(second / "twin.toml")
     ratio = learned.friction["B3"].mu[5] / twin.friction["B3"].mu[5]
     assert ratio == pytest.approx(1.04, abs=0.015)

@@ -129,13 +129,14 @@ def correct_twin(
     z, found = best.point.values, best.problem
     first = np.maximum(np.zeros(problem.unknowns.count), problem.lower)
     covariance: FloatArray = np.linalg.inv(best.normal.information).astype(np.float64)
-    predicted = problem.predict(first), found.predict(z)
+    before, after = problem.predict(first), found.predict(z)
     return Correction(
-        found.unknowns.build_twin(z, covariance),
-        *(_compute_rms(shifts, one) for one in predicted),
-        found.unknowns.describe_values(z, covariance),
-        tuple(found.list_phases(z)),
-        tuple(map(LoggedFit, shifts, *predicted)),
+        twin=found.unknowns.build_twin(z, covariance),
+        before=_compute_rms(shifts, before),
+        after=_compute_rms(shifts, after),
+        values=found.unknowns.describe_values(z, covariance),
+        phases=tuple(found.list_phases(z)),
+        fits=tuple(map(LoggedFit, shifts, before, after)),
     )
 
 

@@ -12,7 +12,7 @@ from hypothesis import assume, given
 
 from drivetwin.errors import FileFormatError, InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.files import ParameterFormat
+from drivetwin.export.parameters.files import ParameterFormat, show_units
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.targets import Names
 from tests.export.parameters.sample import SETS, format_parameters, parse_parameters, twin
@@ -115,6 +115,21 @@ def test_what_a_tool_writes_is_read_and_other_objects_are_named() -> None:
     axis = Axis("x", (0.0, 10.0, 20.0), "1/min")
     assert found.curves == (Curve("KL_Mu", axis, (0.13, 0.12, 0.11), text="friction"),)
     assert found.skipped == ("FESTWERT K_Text", "KENNFELD KF_Any")
+
+
+def test_curves_share_an_axis_and_people_read_few_digits() -> None:
+    speeds = Axis("engine_speed", (100.0, 200.0), "rad/s")
+    both = [Curve(name, speeds, (1e5 / 3.0, 2e5), "Pa", "kiss", 10.0, (0.0, 3e5)) for name in "ab"]
+    text = format_parameters(show_units(ParameterSet("map", (), tuple(both)), ParameterFormat.DCM),
+                             ParameterFormat.DCM)  # fmt: skip
+    assert text.count("STUETZSTELLENVERTEILUNG engine_speed_axis_1 2") == 1
+    assert text.count("*SSTX engine_speed_axis_1") == text.count("GRUPPENKENNLINIE") == 2
+    read = parse_parameters(text, ParameterFormat.DCM)
+    assert read.skipped == ()
+    for one in read.curves:
+        assert one.values == (0.3333, 2.0)
+        assert one.axis.points == (954.93, 1909.859)
+        assert one.text.startswith("kiss, 0 to 3")
 
 
 def test_an_object_without_end_is_refused_by_name() -> None:

@@ -40,6 +40,7 @@ text = "kiss point of B3"
 [parameters.eta]
 label = "Gbx_etaDrv_C"
 unit = "%"
+resolution = 0.1
 
 [parameters.k_o]
 label = "Drv_cShaft_C"
@@ -89,6 +90,10 @@ def test_labels_units_and_breakpoints_are_those_of_the_template(
     assert pressure.unit == "bar"
     assert pressure.value == pytest.approx(1e-5 * before.value)
     assert pressure.text == "kiss point of B3"
+    efficiency, exact = back["Gbx_etaDrv_C"], own["eta"]
+    assert isinstance(efficiency, Scalar)
+    assert isinstance(exact, Scalar)
+    assert efficiency.value == round(100.0 * exact.value, 1)
     assert isinstance(curve, Curve)
     assert curve.axis.points == (0.0, 50.0, 100.0, 300.0, 900.0)
     assert (curve.axis.name, curve.axis.unit) == ("Clt_nSlip", "rpm")

@@ -17,12 +17,18 @@ from drivetwin.errors import FileFormatError, InputError, Where
 
 @dataclass(frozen=True)
 class Scalar:
-    """One number. `unit` is SI in ASCII, `1` without dimension; `text` is one line about it."""
+    """One number. `unit` is SI in ASCII, `1` without dimension; `text` is one line about it.
+
+    Files for people round it to decimals finer than `resolution`; 0: they keep it as it is. They
+    have its `bounds` in the text.
+    """
 
     name: str
     value: float
     unit: str = "1"
     text: str = ""
+    resolution: float = 0.0
+    bounds: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -36,13 +42,15 @@ class Axis:
 
 @dataclass(frozen=True)
 class Curve:
-    """Numbers over one axis, as many as the axis has points."""
+    """Numbers over one axis, as many as the axis has points; the rest as in `Scalar`."""
 
     name: str
     axis: Axis
     values: tuple[float, ...]
     unit: str = "1"
     text: str = ""
+    resolution: float = 0.0
+    bounds: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -141,6 +149,21 @@ def _refuse_twins(names: Iterable[tuple[str, str]]) -> None:
                 "name the elements and gears of the vehicle card with few letters and digits",
             )
         origins[name] = origin
+
+
+def round_to(value: float, resolution: float) -> float:
+    """Round a number to the decimal place that a resolution needs; 0 leaves it as it is."""
+    if resolution <= 0.0:
+        return value
+    return round(value, math.ceil(-math.log10(resolution)))
+
+
+def state_bounds(one: Scalar | Curve, factor: float) -> str:
+    """Return the text of an entry with its bounds, `factor` times those in SI."""
+    if one.bounds is None:
+        return one.text
+    low, high = (factor * end for end in one.bounds)
+    return f"{one.text}, {low:.5g} to {high:.5g}"
 
 
 def format_number(value: float) -> str:

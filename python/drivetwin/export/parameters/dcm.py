@@ -8,6 +8,7 @@ followed by letters, digits, `_`, `.` and brackets; lists break after six number
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -54,9 +55,17 @@ def _write_dcm(content: ParameterSet) -> str:
             f"  WERT {format_number(scalar.value)}",
         ]
         lines += ["END", ""]
+    common = _name_common_axes(content)
+    for axis, name in common.items():
+        lines += [f"STUETZSTELLENVERTEILUNG {name} {len(axis.points)}", f"  FUNKTION {function}"]
+        lines += [f'  EINHEIT_X "{to_tool_unit(axis.unit)}"', *_format_list("ST/X", axis.points)]
+        lines += ["END", ""]
     for curve in content.curves:
         described = replace(curve, text=append_axis(curve.text, curve.axis.name))
-        lines += [f"KENNLINIE {curve.name} {len(curve.values)}", *_format_head(described, function)]
+        own = common.get(curve.axis)
+        kind = "KENNLINIE" if own is None else "GRUPPENKENNLINIE"
+        lines += [f"{kind} {curve.name} {len(curve.values)}", *_format_head(described, function)]
+        lines += [] if own is None else [f"*SSTX {own}"]
         lines += [f'  EINHEIT_X "{to_tool_unit(curve.axis.unit)}"']
         lines += [f'  EINHEIT_W "{to_tool_unit(curve.unit)}"']
         lines += [
@@ -66,6 +75,13 @@ def _write_dcm(content: ParameterSet) -> str:
             "",
         ]
     return "\n".join(lines)
+
+
+def _name_common_axes(content: ParameterSet) -> dict[Axis, str]:
+    """Name the axes that several curves share."""
+    counts = Counter(one.axis for one in content.curves)
+    shared = [axis for axis, count in counts.items() if count > 1]
+    return {axis: f"{axis.name}_axis_{k + 1}" for k, axis in enumerate(shared)}
 
 
 def _format_head(entry: Scalar | Curve, function: str) -> list[str]:
@@ -99,7 +115,7 @@ def _parse_dcm(text: str, source: str) -> ParameterSet:
             scalars.append(_parse_scalar(label, fields, source))
         elif kind in _CURVES and "WERT" in fields and "ST/X" in fields:
             curves.append(_parse_curve(label, fields, source))
-        else:
+        elif kind != "STUETZSTELLENVERTEILUNG":  # curves repeat the points of a common axis
             skipped.append(f"{kind} {label}")
     return ParameterSet(name, tuple(scalars), tuple(curves), skipped=tuple(skipped))
 

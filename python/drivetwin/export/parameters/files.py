@@ -11,7 +11,7 @@ from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file, write_t
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters import cdfx, csv_file, dcm, matlab, ssv
-from drivetwin.export.parameters.content import ParameterSet
+from drivetwin.export.parameters.content import ParameterSet, round_to, state_bounds
 from drivetwin.export.parameters.spelling import choose_unit
 
 
@@ -34,25 +34,31 @@ CODECS = {
 }
 
 
+_AXIS = 1e-6
+"""Resolution of the breakpoints of a rounded curve, over the largest: well below any sample."""
 _FOR_PEOPLE = (ParameterFormat.CDFX, ParameterFormat.DCM)
 """Formats of calibration tools, in which people read and edit numbers."""
 
 
 def show_units(content: ParameterSet, kind: ParameterFormat) -> ParameterSet:
-    """Return the contents in the units in which people read a format: bar and rpm, else SI."""
+    """Return the contents as people read a format: bar and rpm, else SI, rounded, with bounds."""
     if kind not in _FOR_PEOPLE:
         return content
     scalars = []
     for one in content.scalars:
         unit, factor = choose_unit(one.unit)
-        scalars.append(replace(one, value=one.value * factor, unit=unit))
+        value = round_to(one.value * factor, one.resolution * factor)
+        scalars.append(replace(one, value=value, unit=unit, text=state_bounds(one, factor)))
     curves = []
     for curve in content.curves:
         unit, factor = choose_unit(curve.unit)
         along, scale = choose_unit(curve.axis.unit)
-        axis = replace(curve.axis, points=tuple(scale * x for x in curve.axis.points), unit=along)
-        values = tuple(factor * value for value in curve.values)
-        curves.append(replace(curve, axis=axis, values=values, unit=unit))
+        fine = _AXIS * scale * max(map(abs, curve.axis.points)) if curve.resolution else 0.0
+        points = tuple(round_to(scale * x, fine) for x in curve.axis.points)
+        axis = replace(curve.axis, points=points, unit=along)
+        values = tuple(round_to(factor * one, curve.resolution * factor) for one in curve.values)
+        text = state_bounds(curve, factor)
+        curves.append(replace(curve, axis=axis, values=values, unit=unit, text=text))
     return replace(content, scalars=tuple(scalars), curves=tuple(curves))
 
 

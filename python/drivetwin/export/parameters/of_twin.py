@@ -16,6 +16,7 @@ from scipy.constants import zero_Celsius
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import OperatingMap
+from drivetwin.calibration.policy import PolicyParameter
 from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.spelling import choose_unit, to_one_line
@@ -52,7 +53,10 @@ def collect_calibration(
     request = task.maneuver.request
     return ParameterSet(
         name=name,
-        scalars=tuple(Scalar(one.name, value, one.unit, one.text) for one, value in values),
+        scalars=tuple(
+            Scalar(one.name, value, one.unit, one.text, *_describe_range(one))
+            for one, value in values
+        ),
         curves=tuple(
             _build_curve(f"profile.{label}", signal, request, _CURVES[label])
             for label, signal in found.after.profiles.signals.items()
@@ -64,6 +68,15 @@ def collect_calibration(
             _describe_pressures(found),
         ),
     )
+
+
+_FINE = 1e-4
+"""Resolution of a parameter over its range: half of the last step of a polish."""
+
+
+def _describe_range(one: PolicyParameter) -> tuple[float, tuple[float, float]]:
+    """Return resolution and bounds of a parameter."""
+    return _FINE * (one.high - one.low), (one.low, one.high)
 
 
 def _describe_pressures(found: Calibration) -> str:
@@ -87,7 +100,8 @@ def _iterate_map_curves(mapped: OperatingMap) -> Iterator[Curve]:
             points = [mapped.points[torque, j, *oil] for j in range(len(grid.speeds))]
             values = tuple(float(each.found.values[k]) for each in points)
             label, text = _name_column(points[0].task.maneuver.point)
-            yield Curve(f"map.{one.name}.{label}", axis, values, one.unit, f"{one.text}, {text}")
+            labels = one.unit, f"{one.text}, {text}"
+            yield Curve(f"map.{one.name}.{label}", axis, values, *labels, *_describe_range(one))
 
 
 def _name_column(point: OperatingPoint) -> tuple[str, str]:
@@ -102,7 +116,8 @@ def _name_column(point: OperatingPoint) -> tuple[str, str]:
 
 def _build_curve(name: str, signal: Signal, request: float, labels: tuple[str, str]) -> Curve:
     times = tuple((signal.time - request).tolist())
-    return Curve(name, Axis("time", times, "s"), tuple(signal.values.tolist()), *labels)
+    fine = _FINE * float(np.ptp(signal.values))
+    return Curve(name, Axis("time", times, "s"), tuple(signal.values.tolist()), *labels, fine)
 
 
 _RENAMED = {

@@ -19,7 +19,14 @@ from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import find_unit, get_time_factor, is_time_unit, list_first_spellings
 from drivetwin.errors import InputError, Where, suggest_spelling
-from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
+from drivetwin.export.parameters.content import (
+    Axis,
+    Curve,
+    ParameterSet,
+    Scalar,
+    round_to,
+    state_bounds,
+)
 from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.export.parameters.spelling import (
     is_same_unit,
@@ -60,11 +67,15 @@ class AxisRule(StrictModel):
 
 
 class EntryRule(StrictModel):
-    """Number or curve in a file; what is None stays as it is. `in_si` is one `unit` in SI."""
+    """Number or curve in a file; what is None stays as it is. `in_si` is one `unit` in SI.
+
+    Numbers are rounded to decimals as fine as `resolution`, in `unit`.
+    """
 
     label: _Label
     unit: str | None = None
     in_si: _Size | None = None
+    resolution: _Size | None = None
     text: str | None = None
     axis: AxisRule | None = None
 
@@ -174,13 +185,16 @@ def _convert(own: Scalar | Curve, rule: EntryRule) -> Scalar | Curve:
     """Return one entry by the rule of the template."""
     size = _get_size(rule.unit, rule.in_si, own.unit)
     unit = own.unit if rule.unit is None else parse_tool_unit(rule.unit)
-    text = to_one_line(f"{own.text} ({own.name})" if rule.text is None else rule.text)
+    fine = own.resolution / size if rule.resolution is None else rule.resolution
+    stated = f"{state_bounds(own, 1.0 / size)} ({own.name})"
+    text = to_one_line(stated if rule.text is None else rule.text)
     if isinstance(own, Scalar):
         if rule.axis is not None:
             raise InputError("a number has no axis", "")
-        return Scalar(rule.label, own.value / size, unit, text)
+        return Scalar(rule.label, round_to(own.value / size, fine), unit, text)
     axis, values = _convert_axis(own, rule.axis or AxisRule())
-    return Curve(rule.label, axis, tuple((values / size).tolist()), unit, text)
+    rounded = tuple(round_to(value, fine) for value in (values / size).tolist())
+    return Curve(rule.label, axis, rounded, unit, text)
 
 
 def _convert_axis(own: Curve, rule: AxisRule) -> tuple[Axis, FloatArray]:
