@@ -8,8 +8,9 @@
 # %%
 import drivetwin
 from drivetwin.cli import main
-from drivetwin.report.comparison import save_comparison, simulate_trials
+from drivetwin.report.comparison import build_comparison_page, simulate_trials
 from drivetwin.report.find_reports import Candidate, compare_estimates
+from drivetwin.report.html import save_page
 
 results, twins, logs = {}, {}, {}
 for name, seed in (("monday", "1"), ("tuesday", "2")):
@@ -33,7 +34,6 @@ print(crossed.summary())
 crossed.plot()
 
 # %% All of it on one page.
-save_comparison(
-    "comparison.html", candidates, simulate_trials(twins, logs["tuesday"], [shift], "tuesday")
-)
+trials = simulate_trials(twins, logs["tuesday"], [shift], "tuesday")
+save_page("comparison.html", build_comparison_page(candidates, trials))
 assert crossed.fit["output_torque"]["all"].fit_percent > 85.0

@@ -15,7 +15,8 @@ from drivetwin.cli import main
 from drivetwin.fit.fit import fit_network, predict
 from drivetwin.fit.model_file import read_model
 from drivetwin.fit.read import read_recording
-from drivetwin.report.fit import render_fit
+from drivetwin.report.fit import build_fit_page
+from drivetwin.report.html import save_page
 
 for seed, name in enumerate(("tip_in", "other")):
     main(["synth", "--model", "tip_in", "--seed", str(seed), "-o", f"{name}.csv"])
@@ -42,5 +43,5 @@ other, _ = read_recording(Path("other.csv"), model, channels)
 (held_out,) = predict(found, [other])
 for name, fit in held_out.agreement.items():
     print(f"{name:12} {fit.fit_percent:.1f} %")
-page = render_fit(found, ["tip_in.csv"], {"other.csv": held_out}, findings)
-Path("report.html").write_text(page, encoding="utf-8")
+page = build_fit_page(found, ["tip_in.csv"], {"other.csv": held_out}, findings)
+save_page("report.html", page)

@@ -249,17 +249,16 @@ def identify_bus_logs(emit: Emit, task: BusTask) -> None:
     emit(identify_vehicle(task.logs, task.card, task.held))
 
 
-def render_bus_report(emit: Emit, outcome: BusOutcome) -> None:
-    """Emit the report of bus logs as HTML."""
-    from drivetwin.report.html import render_page
-
-    emit(render_page(outcome.build_page()))
-
-
-def render_log_report(emit: Emit, found: Identification, logs: Sequence[ShiftLog]) -> None:
-    """Emit the report of an identification as HTML; `logs` are those fitted, in order."""
+def emit_report(
+    emit: Emit, found: Identification | BusOutcome, logs: Sequence[ShiftLog] = ()
+) -> None:
+    """Emit the report of a result as HTML; `logs` are those fitted, in order."""
     from drivetwin.report.html import build_joint_page, build_report_page, render_page
 
-    is_single = len(logs) == 1 and not found.evidence.held_out
-    page = build_report_page(found, logs[0]) if is_single else build_joint_page(found, logs)
+    if not isinstance(found, Identification):
+        page = found.build_page()
+    elif len(logs) == 1 and not found.evidence.held_out:
+        page = build_report_page(found, logs[0])
+    else:
+        page = build_joint_page(found, logs)
     emit(render_page(page))

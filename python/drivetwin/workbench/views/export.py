@@ -23,7 +23,7 @@ from drivetwin.export.write import ExportedModel, ExportOptions, write_export
 from drivetwin.files.twin_file import save_twin
 from drivetwin.report.bus import BusOutcome
 from drivetwin.workbench import jobs, what_if
-from drivetwin.workbench.identifying import render_bus_report, render_log_report
+from drivetwin.workbench.identifying import emit_report
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
@@ -85,7 +85,7 @@ def _load_model(work: SessionState) -> ExportedModel:
 def _make_bus_record(outcome: BusOutcome, wanted: Record) -> bytes:
     if wanted is Record.RESULT:
         return outcome.build_file().to_json().encode()
-    text: str = jobs.call(render_bus_report, outcome, limit=REPORT_LIMIT)
+    text: str = jobs.call(emit_report, outcome, limit=REPORT_LIMIT)
     return text.encode()
 
 
@@ -100,7 +100,7 @@ def _make_record(work: SessionState, wanted: Record, scratch: Path) -> bytes:
             save_result(path, _get_evidence(work))
         case Record.REPORT:
             found, logs = _get_evidence(work), work.get_fitted_logs()
-            text: str = jobs.call(render_log_report, found, logs, limit=REPORT_LIMIT)
+            text: str = jobs.call(emit_report, found, logs, limit=REPORT_LIMIT)
             return text.encode()
         case Record.SIGNALS:
             return _format_signals(work).encode()
