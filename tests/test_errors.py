@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a fault lies is told as exactly as it is known."""
+"""Where a fault lies is reported as exactly as it is known."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from drivetwin.findings import load_catalogue
 
 
 def test_times_keep_their_milliseconds_in_a_long_log() -> None:
-    told = str(Where("drive.mf4", "TrqOut", 12345.678))
-    assert told == "drive.mf4, channel 'TrqOut', t = 12345.678 s"
+    reported = str(Where("drive.mf4", "TrqOut", 12345.678))
+    assert reported == "drive.mf4, channel 'TrqOut', t = 12345.678 s"
 
 
 def test_an_error_passes_between_processes_and_into_sets() -> None:

@@ -166,8 +166,8 @@ def test_a_remedy_never_asks_for_what_is_stated(
     shifts = drivetwin.detect_shifts(log, card)
     with drivetwin.quick(is_quick):
         found = drivetwin.identify(log, card, shifts)
-    told = [one.remedy for one in found.findings]
-    told += [one.reason for one in found.estimates.values()]
+    reported = [one.remedy for one in found.findings]
+    reported += [one.reason for one in found.estimates.values()]
     for command in (["inspect"], ["shifts"], ["card", "check"]):
         capsys.readouterr()
         end = (
@@ -176,5 +176,5 @@ def test_a_remedy_never_asks_for_what_is_stated(
             else [str(log_path), "--vehicle", str(path)]
         )
         main([*command, *end])
-        told.append(" ".join(" ".join(capsys.readouterr()).split()))
-    assert {one: asked for one in told if (asked := list_asked(one, text))} == {}
+        reported.append(" ".join(" ".join(capsys.readouterr()).split()))
+    assert {one: asked for one in reported if (asked := list_asked(one, text))} == {}

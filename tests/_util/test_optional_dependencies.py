@@ -48,6 +48,6 @@ def test_threads_that_parse_at_once_leave_the_process_as_it_was() -> None:
 
 
 def test_any_fault_of_a_parser_names_the_file() -> None:
-    told = r"log\.mf4: a log cannot be read.*KeyError: 3"
-    with pytest.raises(FileFormatError, match=told), handle_parser_errors("a log", PATH):
+    reported = r"log\.mf4: a log cannot be read.*KeyError: 3"
+    with pytest.raises(FileFormatError, match=reported), handle_parser_errors("a log", PATH):
         raise KeyError(3)

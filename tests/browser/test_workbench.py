@@ -209,10 +209,10 @@ def test_a_message_goes_with_the_next_thing_that_is_done(shown: Page, bench: Ben
     page.get_by_text("Known values of parameters").click()
     value = page.get_by_label(re.compile("locked value of .*B3"))
     stated = value.input_value()
-    for typed, told in (("-1", "lies outside"), (stated, "")):
+    for typed, reported in (("-1", "lies outside"), (stated, "")):
         value.fill(typed)
         page.keyboard.press("Enter")
-        expect(message).to_have_text(re.compile(told) if told else "")
+        expect(message).to_have_text(re.compile(reported) if reported else "")
 
 
 def test_a_typed_time_of_any_detail_counts(shown: Page, bench: Bench) -> None:
@@ -245,8 +245,8 @@ def test_two_workbenches_in_one_browser(
             expect_message(page, "The sample is open with its card")
         names = {cookie["name"] for cookie in context.cookies()}
         assert {f"drivetwin-{urlsplit(one).port}" for one in (bench.address, address)} <= names
-        told = str(context.cookies()) + first.url + second.url
-        assert not any(urlsplit(one).query[6:] in told for one in (bench.address, address))
+        reported = str(context.cookies()) + first.url + second.url
+        assert not any(urlsplit(one).query[6:] in reported for one in (bench.address, address))
         assert first.evaluate("localStorage['drivetwin-key']") != second.evaluate(
             "localStorage['drivetwin-key']"
         )

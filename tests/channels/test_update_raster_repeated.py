@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Values that messages repeat are told where their stamps jitter and where some are lost."""
+"""Values that messages repeat are detected where their stamps jitter and where some are lost."""
 
 from __future__ import annotations
 

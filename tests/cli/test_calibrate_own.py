@@ -53,7 +53,7 @@ def test_faults_of_the_own_controller_are_named(
     )
     given = ["--controller", str(own_controller), "-o", str(tmp_path / "out")]
     assert main(["calibrate", str(tmp_path / "twin.toml"), "--shift", "2-3", *given, *SHORT]) == 2
-    told = " ".join(capsys.readouterr().err.split())
+    reported = " ".join(capsys.readouterr().err.split())
     for word in ("three_phase.c", "SIGSEGV", "time 0.5"):
-        assert word in told
+        assert word in reported
     assert not (tmp_path / "out").exists()

@@ -104,12 +104,12 @@ def test_each_ratio_has_one_finding_with_both_intervals(
     assert main(["card", "check", *files, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["findings"]
     ratios = {"gears[0].ratio", "gears[1].ratio", "final_drive"}
-    told = {one["place"]["key"]: one for one in found if one["place"]["key"] in ratios}
-    assert {key: one["code"] for key, one in told.items()} == {
+    reported = {one["place"]["key"]: one for one in found if one["place"]["key"] in ratios}
+    assert {key: one["code"] for key, one in reported.items()} == {
         "gears[1].ratio": "ratio_off_card", "final_drive": "ratio_off_card",
     }  # fmt: skip
-    assert sum(one["place"]["key"] in ratios for one in found) == len(told)
-    log, card = (told["gears[1].ratio"]["numbers"][one] for one in ("log", "card"))
+    assert sum(one["place"]["key"] in ratios for one in found) == len(reported)
+    log, card = (reported["gears[1].ratio"]["numbers"][one] for one in ("log", "card"))
     assert abs(log["value"] - 1.43) <= log["half_width"] < 1e-3
     assert card["half_width"] == pytest.approx(1.96 * 2.0 / 12.0**0.5 * 1e-3, rel=1e-3)
 

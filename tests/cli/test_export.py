@@ -31,9 +31,9 @@ def test_names_converter_and_default_path(
     monkeypatch.chdir(tmp_path)
     arguments = ["--to", "m", "--names", "simscape", "--powertrain", "truck-324kw", "--json"]
     assert main(["export", str(twin_file), *arguments]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["file"] == "truck.m"
-    assert {"Aeff.B3", "mu_k.B3", "tc_capacity_factor"} <= set(told["parameters"])
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["file"] == "truck.m"
+    assert {"Aeff.B3", "mu_k.B3", "tc_capacity_factor"} <= set(reported["parameters"])
     area = read_parameters(tmp_path / "truck.m")["Aeff_B3"]
     assert isinstance(area, Scalar)
     assert area.value == 2.7e-2

@@ -93,8 +93,8 @@ def test_a_log_of_the_fit_is_simulated_by_its_own_twin(
     (shift,) = json.loads(capsys.readouterr().out)["shifts"]
     several = load_result(written.folder / "result.json").several
     assert several is not None
-    told = several.logs[1].fit["output_torque"]["all"].fit_percent
-    assert shift["fit"]["output_torque"]["all"]["fit_percent"] == pytest.approx(told, abs=0.01)
+    reported = several.logs[1].fit["output_torque"]["all"].fit_percent
+    assert shift["fit"]["output_torque"]["all"]["fit_percent"] == pytest.approx(reported, abs=0.01)
 
 
 def test_the_same_log_twice_is_refused(

@@ -151,8 +151,8 @@ def test_faults_of_files_and_code_are_named(
         'assert = { peak_jrk_m_s3 = 3.0 }\n[[scenarios]]\nname = "nominal"\nmas = 2.0\n',
     )
     assert run(controller, "--scenarios", str(scenarios)) == 2
-    told = capsys.readouterr().err
-    assert "scenarios[0].mas" in told
+    reported = capsys.readouterr().err
+    assert "scenarios[0].mas" in reported
     write_scenarios(tmp_path, 'assert = { peak_jrk = 3.0 }\n[[scenarios]]\nname = "nominal"\n')
     assert run(controller, "--scenarios", str(scenarios)) == 2
     assert "assert.peak_jrk" in capsys.readouterr().err
@@ -162,6 +162,6 @@ def test_faults_of_files_and_code_are_named(
     source = controller.with_name("regulator.c")
     source.write_text(source.read_text().replace("s->ticks++;", "s->ticks++"))
     assert run(controller) == 2
-    told = " ".join(capsys.readouterr().err.split())
-    assert "error: expected" in told
-    assert "correct the C source" in told
+    reported = " ".join(capsys.readouterr().err.split())
+    assert "error: expected" in reported
+    assert "correct the C source" in reported

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A drive as its vehicle's bus would have told it: J1939 frames, in the text form of candump."""
+"""A drive as its vehicle's bus would have carried it: J1939 frames, in the text form of candump."""
 
 from __future__ import annotations
 

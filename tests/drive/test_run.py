@@ -167,9 +167,9 @@ def test_two_vehicles_in_one_drive_are_told(
     assert truck.mass_inertia == pytest.approx(23747 * 0.5**2)
     plan = (Leg(0.0, Until(Watched.TIME, 0.5)),)
     other = replace(truck, mass_inertia=share * truck.mass_inertia)
-    (told,) = run(gearbox, other, plan).warnings
-    assert "6056 kg·m²" in told
-    assert f"{other.mass_inertia:.4g} kg·m²" in told
+    (reported,) = run(gearbox, other, plan).warnings
+    assert "6056 kg·m²" in reported
+    assert f"{other.mass_inertia:.4g} kg·m²" in reported
     assert run(gearbox, truck, plan).warnings == ()
 
 

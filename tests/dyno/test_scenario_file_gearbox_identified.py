@@ -50,7 +50,7 @@ def test_intervals_cover_where_the_card_states_the_drums() -> None:
         for name, true in bench.truth.parameters.items():
             if (interval := found.estimates[name].ci95_total) is not None:
                 held.setdefault(name, []).append(interval[0] <= true <= interval[1])
-    told = {name: sum(each) for name, each in held.items() if len(each) == COARSE}
-    assert len(told) >= 10
-    for count in told.values():
+    reported = {name: sum(each) for name, each in held.items() if len(each) == COARSE}
+    assert len(reported) >= 10
+    for count in reported.values():
         assert_covers(count, COARSE, conservative=True)

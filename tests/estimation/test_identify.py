@@ -143,9 +143,9 @@ def test_constant_engine_torque_is_said_in_words_not_hidden() -> None:
 def test_a_log_with_throttle_steps_tells_everything() -> None:
     found = identified("truck_a", Method.LIKELIHOOD)
     assert list(found.inputs) == ["truck_a.csv", "truck_a.toml"]
-    told = {name for name, e in found.estimates.items() if e.verdict is Verdict.IDENTIFIED}
-    assert {"eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "te_delay"} <= told
-    assert {"k_o", "c_o", "f_d_3", "zeta_3", "P0.B3"} <= told
+    reported = {name for name, e in found.estimates.items() if e.verdict is Verdict.IDENTIFIED}
+    assert {"eta", "J_prime_2", "J_prime_3", "J_vehicle", "Tv_over_if", "te_delay"} <= reported
+    assert {"k_o", "c_o", "f_d_3", "zeta_3", "P0.B3"} <= reported
     assert found.correlation is not None
     assert found.correlation.shape == (len(found.correlation_ids),) * 2
     assert get_likelihood_fit(found)[0].chi2 == pytest.approx(1.0, abs=0.05)

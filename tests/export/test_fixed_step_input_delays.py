@@ -119,8 +119,10 @@ def test_fmu_delays_its_inputs_and_saves_the_lines(delayed: Path) -> None:
     core = run_core(
         case.subject.model, case.subject.start, case.time, case.inputs, kind, LATE_PRESSURE
     )
-    told = np.concatenate((begin, rest))[:, 1]
-    assert np.abs(told - core.shaft_torque[1:901]).max() < 1e-9 * np.abs(core.shaft_torque).max()
+    reported = np.concatenate((begin, rest))[:, 1]
+    assert (
+        np.abs(reported - core.shaft_torque[1:901]).max() < 1e-9 * np.abs(core.shaft_torque).max()
+    )
     unpacked = instance.fmu.deserializeFMUState(packed)
     for state in (saved, unpacked):
         instance.fmu.setFMUState(state)

@@ -14,16 +14,16 @@ from tests.estimation.asked import still
 
 def test_what_would_narrow_an_open_parameter_stands_in_the_result() -> None:
     found = still()
-    told = compute_rankings(found)
+    reported = compute_rankings(found)
     made = ResultFile.from_result(
-        replace(found, evidence=replace(found.evidence, suggestions=told))
+        replace(found, evidence=replace(found.evidence, suggestions=reported))
     )
-    assert [one.parameter for one in made.suggestions] == [one.parameter for one in told]
+    assert [one.parameter for one in made.suggestions] == [one.parameter for one in reported]
     (age,) = (one for one in made.suggestions if one.parameter == "te_delay")
     assert age.half_width is None
     assert age.unit == "s"
     assert age.experiments[0].half_width == pytest.approx(
-        next(one for one in told if one.parameter == "te_delay").prospects[0].half_width
+        next(one for one in reported if one.parameter == "te_delay").prospects[0].half_width
     )
     assert '"suggestions"' in made.to_json()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mistakes of an edit by hand in `twin.toml`, each told by its key."""
+"""Mistakes of an edit by hand in `twin.toml`, each reported by its key."""
 
 from __future__ import annotations
 

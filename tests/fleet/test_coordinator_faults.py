@@ -114,9 +114,9 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(tmp_path: Pa
     with small_disk(disk, size):
         store, ballast = disk / "store", disk / "ballast"
         ballast.write_bytes(bytes(size - 150_000))
-        with pytest.raises(StoreError, match=r"No space|full") as told:
+        with pytest.raises(StoreError, match=r"No space|full") as reported:
             run_toys(logs, store)
-        assert "make room" in told.value.remedy or "free space" in told.value.remedy
+        assert "make room" in reported.value.remedy or "free space" in reported.value.remedy
         found = contents(store)
         assert len(found["rows"]) < COUNT
         ballast.unlink()

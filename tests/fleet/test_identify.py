@@ -43,8 +43,8 @@ def test_a_channel_without_values_leaves_no_field_and_says_so(log: Path) -> None
     rows = identify_log(_task(log, ("oil_degC", "TOil"), ("gear_degC", "TGear"))).rows
     (oil,) = [row for row in rows if row.kind.value == "field"]
     assert (oil.name, oil.value, oil.si_unit) == ("oil_degC", 85.0, "degC")
-    (told,) = [row.reason for row in rows if "TGear" in row.reason]
-    assert "no field 'gear_degC'" in told
+    (reported,) = [row.reason for row in rows if "TGear" in row.reason]
+    assert "no field 'gear_degC'" in reported
     assert any(row.kind.value == "parameter" for row in rows)
 
 

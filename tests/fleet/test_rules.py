@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rules: which card a log gets, whose it is, its fields; every fault told."""
+"""Rules: which card a log gets, whose it is, its fields; every fault reported."""
 
 from __future__ import annotations
 

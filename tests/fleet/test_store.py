@@ -135,9 +135,9 @@ def test_a_damaged_index_may_be_removed(tmp_path: Path) -> None:
     index = tmp_path / "a" / "index.sqlite"
     index.write_bytes(index.read_bytes()[:3000])
     for write in (True, False):
-        with pytest.raises(StoreError, match="is damaged") as told:
+        with pytest.raises(StoreError, match="is damaged") as reported:
             Store(tmp_path / "a", write=write)
-        assert "remove the file" in told.value.remedy
+        assert "remove the file" in reported.value.remedy
     index.unlink()
     with Store(tmp_path / "a", write=True) as store:
         assert store.read_table("logs") == []

@@ -161,7 +161,7 @@ def damaged(is_quick: bool, folder: Path) -> Callable[[int], str]:
         except DrivetwinError as refusal:
             return f"{kind}: {type(refusal).__name__}"
         if reports_damage(found, one.found):
-            return f"{kind}: told"
+            return f"{kind}: reported"
         off = [name for name in moved(found, one.found, 2.0) if (kind, name) != ("late", AGE)]
         return f"{kind}: silent" if off else f"{kind}: holds"
 

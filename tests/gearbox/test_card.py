@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Gearbox cards: built-in names, paths, and every fault told by its key."""
+"""Gearbox cards: built-in names, paths, and every fault reported by its key."""
 
 from __future__ import annotations
 

@@ -194,5 +194,5 @@ def test_of_a_number_and_a_date_one_is_the_time_and_the_other_named() -> None:
     }
     log = read_arrays(table, None, units={"n_Abtrieb": "rpm"}, needed=())
     assert list(log.channels) == ["output_speed"]
-    told = [one.names.get("text") for one in log.findings]
-    assert "several time columns: time is used, not timestamp" in told
+    reported = [one.names.get("text") for one in log.findings]
+    assert "several time columns: time is used, not timestamp" in reported

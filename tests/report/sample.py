@@ -112,8 +112,8 @@ def log(time: FloatArray = TIME) -> ShiftLog:
 
 
 def estimates() -> dict[str, Estimate]:
-    """All parameters a model needs, one of them weak, one not to be told."""
-    told = {
+    """All parameters a model needs, one of them weak, one not to be reported."""
+    reported = {
         "eta": (0.85, 0.002, 0.01),
         "J_prime_2": (17.5, 0.08, 0.2),
         "J_prime_3": (17.69, 0.09, 0.2),
@@ -127,7 +127,7 @@ def estimates() -> dict[str, Estimate]:
     }
     found = {
         key: Estimate(key, value, noise, Verdict.IDENTIFIED, "likelihood", systematic)
-        for key, (value, noise, systematic) in told.items()
+        for key, (value, noise, systematic) in reported.items()
     }
     found["c_o"] = Estimate(
         "c_o", 280.0, 45.0, Verdict.WEAK, "ring-down", 4.0, "the oscillation is short"

@@ -54,6 +54,6 @@ def test_friction_work_is_told_where_the_on_coming_element_carries_the_torque(
     log, card, kind = recording
     (shift,), _ = detect_shifts(log, card)
     work = {name: value for name, value in shift.quality.items() if name.startswith("friction_")}
-    told = {"friction_work", "friction_power_max"}
-    assert set(work) == (set() if kind is ShiftKind.POWER_ON_DOWN else told)
+    reported = {"friction_work", "friction_power_max"}
+    assert set(work) == (set() if kind is ShiftKind.POWER_ON_DOWN else reported)
     assert all(value > 1e3 for value in work.values())

@@ -46,10 +46,10 @@ def stimulus_of(path: Path) -> np.ndarray:
     return np.genfromtxt(text, delimiter=",", skip_header=1)
 
 
-def same(told: np.ndarray, expected: np.ndarray) -> bool:
+def same(reported: np.ndarray, expected: np.ndarray) -> bool:
     """Within 1e-9 of the largest value of every column."""
     largest = np.abs(expected).max(axis=0)
-    return bool((np.abs(told - expected).max(axis=0) < 1e-9 * largest).all())
+    return bool((np.abs(reported - expected).max(axis=0) < 1e-9 * largest).all())
 
 
 @pytest.mark.skipif(detect_platform() is None, reason="FMI names no platform like this one")
@@ -64,7 +64,7 @@ def test_fmu_3_with_the_log_as_input_is_simulate_with_held_inputs(
     signals = np.array(
         [tuple(row) for row in stimulus], [(name, float) for name in ("time", *INPUTS)]
     )
-    told = fmpy.simulate_fmu(
+    reported = fmpy.simulate_fmu(
         str(path),
         output_interval=1e-3,
         input=signals,
@@ -72,7 +72,12 @@ def test_fmu_3_with_the_log_as_input_is_simulate_with_held_inputs(
     )
     expected = simulated(log, twin, tmp_path / "hold.csv", "hold")
     columns = np.column_stack(
-        [told["time"], told["output_torque"], told["engine_speed"], told["output_speed"]]
+        [
+            reported["time"],
+            reported["output_torque"],
+            reported["engine_speed"],
+            reported["output_speed"],
+        ]
     )
     assert same(columns, expected)
 
@@ -122,10 +127,10 @@ def test_c_sources_and_what_is_refused(
                  "--json"]) == 0  # fmt: skip
     assert json.loads(capsys.readouterr().out)["file"] == str(folder)
     assert "dt_twin_params" in (folder / "dt_twin.c").read_text("utf-8")
-    for bad, told in (("2", "does not name two gears"), ("2-7", "no gear '7'")):
+    for bad, reported in (("2", "does not name two gears"), ("2-7", "no gear '7'")):
         target = str(tmp_path / "other")
         assert main(["export", str(twin), "--to", "c", "--shift", bad, "-o", target]) == 2
-        assert told in capsys.readouterr().err
+        assert reported in capsys.readouterr().err
     assert not (tmp_path / "other").exists()
     arguments = ["export", str(twin), "--to", "c", "--shift", "3-2", "--log", str(log)]
     assert main([*arguments, "-o", str(tmp_path / "other")]) == 2
@@ -159,10 +164,10 @@ def test_an_edited_parameter_file_drives_the_simulation(
     exported.write_text("\n".join(lines), "ascii")
     capsys.readouterr()
     softer = traces(given, tmp_path / "softer.csv")
-    told = capsys.readouterr().err
-    assert "twin.dcm changes k_o\n" in told
-    assert "no simulation depends on f_d_3\n" in told
-    assert "neither number nor curve: TEXTSTRING remark\n" in told
+    reported = capsys.readouterr().err
+    assert "twin.dcm changes k_o\n" in reported
+    assert "no simulation depends on f_d_3\n" in reported
+    assert "neither number nor curve: TEXTSTRING remark\n" in reported
     assert np.abs(softer[:, 1] - plain[:, 1]).max() > 50.0
 
 

@@ -47,11 +47,11 @@ def test_each_shift_has_its_own_load_and_the_parameters_do_not_feel_it() -> None
     one, model = identify_hills(), scenario().model
     truth = {"Tv_over_if": float(np.mean(LOADS)), "J_vehicle": model.J_v, "eta": model.eta}
     for name, value in truth.items():
-        told = one.estimates[name]
-        assert told.value is not None
-        assert told.std_total is not None
-        assert abs(told.value - value) < 3.5 * told.std_total, name
-        assert told.std_total < 5e-3 * value, name
+        reported = one.estimates[name]
+        assert reported.value is not None
+        assert reported.std_total is not None
+        assert abs(reported.value - value) < 3.5 * reported.std_total, name
+        assert reported.std_total < 5e-3 * value, name
     assert one.evidence.loads == pytest.approx(LOADS, rel=0.01)
     assert Code.LOADS_DIFFER in [each.code for each in one.findings]
     assert any("constant over each shift" in text for text in one.assumptions)

@@ -114,7 +114,7 @@ def test_the_same_shifts_are_found(name: str, tmp_path: Path) -> None:
     found = found_in(frames, tmp_path)
     assert [(s.start_gear, s.end_gear) for s in found.shifts] == [p[:2] for p in PHASES]
     assert found.rejected == ()
-    # Stamps that count from 1970 are told from the first frame on.
+    # Stamps that count from 1970 are reported from the first frame on.
     zero = recorded()[0].time if frames[0].time > 1e9 else 0.0
     for shift, (_, _, begin, end) in zip(found.shifts, PHASES, strict=True):
         assert shift.inertia_phase == pytest.approx((begin - zero, end - zero), abs=0.05)

@@ -112,7 +112,7 @@ def get_lag(known: Known) -> float:
 def run_fmu(path: Path, inputs: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
     """Time and output torque by FMPy, which holds inputs over a step."""
     dtype = [(name, float) for name in ("time", *INPUTS)]
-    told = fmpy.simulate_fmu(
+    reported = fmpy.simulate_fmu(
         str(path),
         start_time=inputs[0, 0],
         stop_time=inputs[-1, 0],
@@ -122,7 +122,7 @@ def run_fmu(path: Path, inputs: FloatArray, step: float) -> tuple[FloatArray, Fl
         output=["output_torque"],
         fmi_type="CoSimulation",
     )
-    return told["time"], told["output_torque"]
+    return reported["time"], reported["output_torque"]
 
 
 @pytest.mark.skipif(detect_platform() is None, reason="FMI names no platform like this one")
@@ -145,8 +145,8 @@ def run_c(folder: Path, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
     done = subprocess.run(
         [folder / "dt_run"], input=rows, capture_output=True, text=True, check=True
     )
-    told = np.genfromtxt(done.stdout.splitlines(), delimiter=",", names=True)
-    return told["time"], told["output_torque"]
+    reported = np.genfromtxt(done.stdout.splitlines(), delimiter=",", names=True)
+    return reported["time"], reported["output_torque"]
 
 
 @pytest.mark.parametrize("name", LOGS)
@@ -188,9 +188,9 @@ def test_modelica(name: str, as_logged: bool, tmp_path: Path) -> None:
     write_modelica(replace(subject, start=start), part, path)
     text = path.read_text("utf-8")
     path.unlink()
-    told = compiled.run(text, part.time, ("output_shaft.tau",), tmp_path, tolerance=1e-5)
+    reported = compiled.run(text, part.time, ("output_shaft.tau",), tmp_path, tolerance=1e-5)
     assert lag == (pytest.approx(get_lag(known)) if as_logged else 0.0)
-    assert known.compare(part.time, -told["output_shaft.tau"], lag) < WORSE
+    assert known.compare(part.time, -reported["output_shaft.tau"], lag) < WORSE
 
 
 def test_a_log_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,8 +73,8 @@ def test_the_check_of_the_card_names_what_the_log_knows_better(
     files = [str(CASE / name) for name in ("card2.toml", "Schaltung_23.csv")]
     assert main(["card", "check", *files, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["findings"]
-    told = {one["subject"]: one["numbers"] for one in found if one["code"] == "ratio_refined"}
+    reported = {one["subject"]: one["numbers"] for one in found if one["code"] == "ratio_refined"}
     truth = load_truth()
-    assert set(told) == {"ratio_1", "ratio_2", "i_f"}
-    for name, numbers in told.items():
+    assert set(reported) == {"ratio_1", "ratio_2", "i_f"}
+    for name, numbers in reported.items():
         assert numbers["log"]["value"] == pytest.approx(truth[name], rel=5e-5)

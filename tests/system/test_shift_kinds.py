@@ -57,7 +57,7 @@ def test_truth_lies_in_the_intervals(
     assert sizes.max() < 3.5, deviations
     assert np.count_nonzero(sizes < 1.96) >= compute_bounds(len(sizes))[0], deviations
     if name is ScenarioName.POWER_ON_DOWN:
-        # B3 slips while the engine climbs: its friction is told beside that of B2, which differs.
+        # B3 slips while the engine climbs: its friction is given beside that of B2, which differs.
         _holds(result["friction"]["B3"], made.truth.friction["B3"])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A machine that lacks something is told so in one line, and nothing else happens."""
+"""A machine that lacks something is reported so in one line, and nothing else happens."""
 
 from __future__ import annotations
 

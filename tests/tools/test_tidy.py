@@ -185,9 +185,9 @@ def test_private_words_are_found_as_files_folders_and_definitions() -> None:
     files = {
         WORDS: words,
         f"{PACKAGE}/app/a.py": "",
-        f"{PACKAGE}/cli/app.py": "def told(): ...",
+        f"{PACKAGE}/cli/app.py": "def reported(): ...",
         f"{PACKAGE}/logs/held.py": "def estimated(): ...",
-        f"{PACKAGE}/logs/a.py": "ENOUGH = 1\nclass A:\n    def told(self): ...\n",
+        f"{PACKAGE}/logs/a.py": "ENOUGH = 1\nclass A:\n    def reported(self): ...\n",
         "crates/a.rs": "// fn sprint\nenum A {\n    Stuck,\n    Open(u8),\n}\nfn sprint() {}\n",
     }
     assert sorted(faults(check_words, files)) == [
@@ -210,7 +210,7 @@ def test_private_words_are_found_within_identifiers_and_texts() -> None:
         WORDS: words,
         f"{PACKAGE}/a.py": "# a part of an age\nmessage = 0\nsensor.age = 1\nstages = MyPart()\n",
         f"{PACKAGE}/b.toml": 'text = "The age\n  of the torque"\nuntold = 1\n',
-        "docs/a.md": "It is told.\n\nThe columns are Formed\nanew.\n",
+        "docs/a.md": "It is reported.\n\nThe columns are Formed\nanew.\n",
     }
     assert sorted(faults(check_words, files)) == [
         ("docs/a.md", 3),

@@ -47,22 +47,22 @@ def test_a_load_that_grows_with_speed_holds_the_told_value_at_the_mean_speed(
 
 def without_scale(twin: Twin, eta: float) -> Twin:
     """What a log without an output torque tells of the twin."""
-    told = dict(twin.parameters)
+    reported = dict(twin.parameters)
     for name in ("J_prime_2", "J_prime_3", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o"):
-        one = told[name]
+        one = reported[name]
         assert one.value is not None
-        told[name] = replace(one, value=None)
-        told[name + "_over_eta"] = replace(one, id=name + "_over_eta", value=one.value / eta)
-    told["eta"] = replace(told["eta"], value=None)
-    told["drum.B3_over_eta"] = replace(
-        told["k_o_over_eta"], id="drum.B3_over_eta", value=0.05 / eta
+        reported[name] = replace(one, value=None)
+        reported[name + "_over_eta"] = replace(one, id=name + "_over_eta", value=one.value / eta)
+    reported["eta"] = replace(reported["eta"], value=None)
+    reported["drum.B3_over_eta"] = replace(
+        reported["k_o_over_eta"], id="drum.B3_over_eta", value=0.05 / eta
     )
     curve = twin.friction["B3"]
     law = curve.stribeck
     assert law is not None
     ratio = Stribeck(law.mu_c / eta, law.mu_s / eta, law.v_s, law.mu_v / eta)
     curve = replace(curve, stribeck=ratio, over_eta=True)
-    return replace(twin, parameters=told, friction={"B3": curve})
+    return replace(twin, parameters=reported, friction={"B3": curve})
 
 
 def test_without_a_torque_scale_the_model_is_over_eta_and_its_motion_the_same(twin: Twin) -> None:
@@ -114,8 +114,8 @@ def test_a_twin_is_made_with_the_efficiency_from_design_in_friction_and_load() -
     curve = replace(found.friction["B3"], stribeck_covariance=np.diag([1e-6, 1e-6, 0.5, 1e-10]))
     curve = replace(curve, over_eta=True)
     law = LoadLaw(aero=4.8, std=0.1, mean_speed=14.3, over_eta=True)
-    told = replace(found, estimates={**found.estimates, "eta": design}, friction={"B3": curve})
-    made = build_twin(replace(told, load=law), card())
+    reported = replace(found, estimates={**found.estimates, "eta": design}, friction={"B3": curve})
+    made = build_twin(replace(reported, load=law), card())
     one, load = made.friction["B3"], made.load_law
     assert not one.over_eta
     assert one.mu == pytest.approx(eta * curve.mu)
@@ -159,9 +159,9 @@ def test_curve_without_a_law_becomes_a_table_from_zero_slip(twin: Twin) -> None:
 def test_identified_drum_goes_before_the_cards(twin: Twin, tmp_path: Path) -> None:
     assert [one.drum_inertia for one in twin.build_dual_clutch(SHIFT).elements] == [0.0, 0.05]
     drum = Estimate("drum.B3", 0.07, 0.01, Verdict.IDENTIFIED, "likelihood")
-    told = replace(twin, parameters={**twin.parameters, "drum.B3": drum})
-    save_twin(tmp_path / "twin.toml", told)
-    for one in (told, load_twin(tmp_path / "twin.toml")):
+    reported = replace(twin, parameters={**twin.parameters, "drum.B3": drum})
+    save_twin(tmp_path / "twin.toml", reported)
+    for one in (reported, load_twin(tmp_path / "twin.toml")):
         assert one.build_dual_clutch(SHIFT).elements[1].drum_inertia == 0.07
         assert one.elements["B3"].drum == 0.05
         other = one.build_dual_clutch(SHIFT, overrides={"drum.B3": 5.0})
@@ -178,10 +178,10 @@ def test_an_override_without_effect_is_refused_with_those_that_act(twin: Twin, n
 
 
 def test_missing_parameter_is_named_with_its_reason(twin: Twin) -> None:
-    told = dict(twin.parameters)
-    told["k_o"] = replace(told["te_delay"], id="k_o", reason="no oscillation after lock-up")
-    del told["eta"]
-    partial = replace(twin, parameters=told)
+    reported = dict(twin.parameters)
+    reported["k_o"] = replace(reported["te_delay"], id="k_o", reason="no oscillation after lock-up")
+    del reported["eta"]
+    partial = replace(twin, parameters=reported)
     with pytest.raises(MissingParameterError) as caught:
         partial.build_dual_clutch(SHIFT)
     assert "k_o (no oscillation after lock-up)" in str(caught.value)

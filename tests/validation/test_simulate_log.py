@@ -169,9 +169,9 @@ def test_late_engine_torque_is_moved_back(twin: Twin, log: ShiftLog, shift: Shif
     torque = log["engine_torque"]
     late = replace(torque, time=torque.time + 0.02)
     delayed = replace(log, channels={**log.channels, "engine_torque": late})
-    told = dict(twin.parameters)
-    told["te_delay"] = replace(told["te_delay"], value=0.02)
-    result = simulate_shift(replace(twin, parameters=told), delayed, shift)
+    reported = dict(twin.parameters)
+    reported["te_delay"] = replace(reported["te_delay"], value=0.02)
+    result = simulate_shift(replace(twin, parameters=reported), delayed, shift)
     assert result.fit["output_torque"]["all"].fit_percent > 99.8
 
 
@@ -194,9 +194,10 @@ def test_a_wheel_speed_that_stopped_before_the_shift_takes_no_part(
 ) -> None:
     late = replace(shift, before=(0.1, shift.before[1]))
     without = replace(log, channels={k: c for k, c in log.channels.items() if k != "wheel_speed"})
-    told = simulate_shift(twin, _until(log, "wheel_speed", 0.05), late)
+    reported = simulate_shift(twin, _until(log, "wheel_speed", 0.05), late)
     assert np.array_equal(
-        told.trajectory.shaft_torque, simulate_shift(twin, without, late).trajectory.shaft_torque
+        reported.trajectory.shaft_torque,
+        simulate_shift(twin, without, late).trajectory.shaft_torque,
     )
 
 
@@ -218,17 +219,17 @@ def test_a_torque_that_stopped_before_the_shift_is_named(
     stopped = _until(log, "output_torque", 0.2)
     with pytest.raises(DamagedChannelError, match=r"'T_o_Nm' .* 0\.000 s to 0\.200 s"):
         simulate_shift(twin, stopped, shift)
-    told = attach_validation(replace(identification(), shifts=(shift,)), twin, stopped)
-    assert told.fit == {}
-    assert "No validation: 'T_o_Nm'" in render(told.findings)[-1]
+    reported = attach_validation(replace(identification(), shifts=(shift,)), twin, stopped)
+    assert reported.fit == {}
+    assert "No validation: 'T_o_Nm'" in render(reported.findings)[-1]
 
 
 def test_incomplete_model_leaves_a_warning_and_no_fit(
     twin: Twin, log: ShiftLog, shift: Shift
 ) -> None:
-    told = {key: one for key, one in twin.parameters.items() if key != "k_o"}
+    reported = {key: one for key, one in twin.parameters.items() if key != "k_o"}
     found = replace(identification(), shifts=(shift,))
-    incomplete = attach_validation(found, replace(twin, parameters=told), log)
+    incomplete = attach_validation(found, replace(twin, parameters=reported), log)
     assert incomplete.fit == {}
     assert "No validation" in render(incomplete.findings)[-1]
     assert "k_o" in render(incomplete.findings)[-1]

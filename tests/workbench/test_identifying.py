@@ -13,14 +13,14 @@ from drivetwin.workbench import identifying
 
 
 @pytest.mark.parametrize(
-    ("fault", "told"),
+    ("fault", "reported"),
     [
         (DrivetwinError("the pressure has a gap", "record it again"), "-> record it again"),
         (np.linalg.LinAlgError("singular"), "of the workbench (LinAlgError: singular)"),
     ],
 )
 def test_what_ends_one_method_is_told_beside_what_the_others_find(
-    identified: Any, monkeypatch: pytest.MonkeyPatch, fault: Exception, told: str
+    identified: Any, monkeypatch: pytest.MonkeyPatch, fault: Exception, reported: str
 ) -> None:
     identify = vars(identifying)["identify_together"]
 
@@ -37,5 +37,5 @@ def test_what_ends_one_method_is_told_beside_what_the_others_find(
     )
     identifying.identify_all(found.append, task)
     refusal, outcome = found
-    assert told in refusal.text
+    assert reported in refusal.text
     assert outcome.method is Method.LIKELIHOOD

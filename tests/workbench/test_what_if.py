@@ -58,12 +58,12 @@ def test_a_parameter_moves_the_run_as_another_twin_would(
 
 
 def test_the_age_of_the_torque_moves_the_torque(moved: Any) -> None:
-    told = moved.work.require_twin().get_value("te_delay", 0.0)
+    reported = moved.work.require_twin().get_value("te_delay", 0.0)
     before = moved.get_simulation().present.engine_torque
     moved.apply_sliders({"te_delay": 0.02})
     present = moved.get_simulation().present.engine_torque
     middle = slice(5, -5)
-    shifted = before.time[middle] + told - 0.02
+    shifted = before.time[middle] + reported - 0.02
     assert np.interp(shifted, present.time, present.values) == pytest.approx(
         before.values[middle], rel=1e-9
     )

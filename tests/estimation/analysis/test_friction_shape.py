@@ -100,6 +100,6 @@ def test_is_monotone_and_no_neighbour_is_nearer(seed: int, size: int, shape: Fri
 def test_a_curve_of_that_shape_stays_as_it_is() -> None:
     mu, covariance = np.array([0.14, 0.12, 0.11]), 1e-6 * np.eye(3)
     for shape in (FrictionShape.FREE, FrictionShape.FALLING):
-        told, within = project_shape(shape, mu, covariance)
-        assert told == pytest.approx(mu, abs=1e-9)
+        reported, within = project_shape(shape, mu, covariance)
+        assert reported == pytest.approx(mu, abs=1e-9)
         assert within == pytest.approx(covariance, abs=1e-12)

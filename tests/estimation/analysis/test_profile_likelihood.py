@@ -70,6 +70,8 @@ def test_refuses_other_methods_and_says_why_a_fit_failed() -> None:
     with pytest.raises(IdentificationError, match="paper method"):
         compute_profile(by_the_paper(), "eta")
     evidence = replace(by_the_paper().evidence, gave_up="the work ran out")
-    with pytest.raises(IdentificationError, match=r"fit of this log failed.+ the work ran") as told:
+    with pytest.raises(
+        IdentificationError, match=r"fit of this log failed.+ the work ran"
+    ) as reported:
         compute_profile(replace(by_the_paper(), evidence=evidence), "eta")
-    assert "--method likelihood" not in told.value.remedy
+    assert "--method likelihood" not in reported.value.remedy

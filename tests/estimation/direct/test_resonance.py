@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A decay is told with its uncertainty where there is one, and refused where there is none."""
+"""A decay is estimated with its uncertainty where there is one, and refused where there is none."""
 
 from __future__ import annotations
 

@@ -21,10 +21,10 @@ def test_what_the_first_shift_cannot_tell_comes_from_the_next(stepped: Run) -> N
     kept = {name: value for name, value in second.values.items() if name not in SHAFT}
     first = replace(second, values={**kept, "eta": 1.5}, refusals={"shaft": "no clean lock-up"})
     both = [signals, signals], [driveline, driveline]
-    told = assess_paper_shifts([first, second], *both).estimates
+    reported = assess_paper_shifts([first, second], *both).estimates
     for name in ("eta", *SHAFT):
-        assert told[name].value == pytest.approx(second.values[name])
-        assert told[name].verdict is Verdict.WEAK
+        assert reported[name].value == pytest.approx(second.values[name])
+        assert reported[name].verdict is Verdict.WEAK
     alone = assess_paper_shifts([first], [signals], [driveline]).estimates
     for name in ("eta", *SHAFT):
         assert alone[name].value is None

@@ -324,15 +324,15 @@ def assert_goes_on_as_the_core(run: Steps, other: DualClutch, row: FloatArray) -
     """With the parameters of `other` for 40 ms."""
     at_change = run.resumed(other)
     set_model(run.loaded, other, at_change)
-    told = [(run.step(), run.row()) for _ in range(40)]
+    reported = [(run.step(), run.row()) for _ in range(40)]
     time = np.linspace(0.0, 0.04, 41)
     core = run_core(other, at_change, time, np.tile(row, (41, 1)), InputKind.HOLD)
     signals = (core.engine_speed, core.output_speed, core.wheel_speed, core.twist)
     torques = (core.shaft_torque, *core.clutch_torque.values())
     expected = np.column_stack((*signals, *torques))[1:]
-    rows = [values for status, values in told if status == "completed"]
+    rows = [values for status, values in reported if status == "completed"]
     seen = np.array(rows).reshape(len(rows), expected.shape[1])
-    assert seen.shape == expected.shape or told[-1][0] == "engine stalled"
+    assert seen.shape == expected.shape or reported[-1][0] == "engine stalled"
     scale = np.abs(expected).max(axis=0) + 1e-3
     assert np.all(np.abs(seen - expected[: len(seen)]) < 1e-7 * scale)
 
@@ -403,14 +403,14 @@ def test_observer_tells_torque_friction_and_load_that_no_sensor_shows(
     twin: CModel = request.getfixturevalue(fixture)
     set_model(twin, believed.model, believed.start)
     observer = CObserver(twin, case.inputs[0], (engine[0], output[0]))
-    told = [
+    reported = [
         observer.update_estimates(case.inputs[i], (engine[i], output[i]), 1e-3)
         for i in range(1, case.time.size)
     ]
-    torque = np.array([one.output_torque for one in told])
+    torque = np.array([one.output_torque for one in reported])
     error = np.sqrt(np.mean((torque - core.shaft_torque[1:])[100:] ** 2))
     assert error < 0.02 * np.ptp(core.shaft_torque)
-    assert told[-1].locked == 1
-    assert abs(told[-1].scale[1] - 0.85) < 3.0 * told[-1].scale_std[1] + 0.02
-    assert told[-1].scale_std[1] < 0.05
-    assert abs(told[-1].load - heavy.constant) < 3.0 * told[-1].load_std
+    assert reported[-1].locked == 1
+    assert abs(reported[-1].scale[1] - 0.85) < 3.0 * reported[-1].scale_std[1] + 0.02
+    assert reported[-1].scale_std[1] < 0.05
+    assert abs(reported[-1].load - heavy.constant) < 3.0 * reported[-1].load_std

@@ -105,25 +105,25 @@ def test_runner_is_clean_under_sanitizers_and_within_the_reference(
     call(compiler("gcc"), "-std=c99", *SANITIZERS, *sources, "-lm", "-o", program)
     for arguments in ([], ["hold"]):
         rows = call(program, *arguments, text=table(case)).splitlines()
-        told = np.genfromtxt(rows, delimiter=",", names=True)
-        assert told.size == case.time.size
-        deviation = case.deviation(told["output_torque"])
+        reported = np.genfromtxt(rows, delimiter=",", names=True)
+        assert reported.size == case.time.size
+        deviation = case.deviation(reported["output_torque"])
         assert (deviation < 1e-3) == (not arguments and not delays.as_logged)
 
 
 @pytest.mark.parametrize(
-    ("row", "code", "told"),
+    ("row", "code", "reported"),
     [("0.01,100,8e5", 6, "no row of four numbers"), ("0.01,nan,0,0", 2, "out of range after 0 s")],
 )
 def test_runner_tells_a_row_that_it_cannot_take(
-    sources: list[Path], tmp_path: Path, row: str, code: int, told: str
+    sources: list[Path], tmp_path: Path, row: str, code: int, reported: str
 ) -> None:
     program = tmp_path / "run"
     call(compiler("gcc"), "-std=c99", *sources, "-lm", "-o", program)
     text = f"time,torque,off,on\n\n0,100,8e5,0\n{row}\n0.02,100,8e5,0\n"
     done = subprocess.run([program], input=text, capture_output=True, text=True, check=False)
     assert done.returncode == code
-    assert told in done.stderr
+    assert reported in done.stderr
     assert len(done.stdout.splitlines()) == 2
 
 
@@ -143,13 +143,13 @@ def test_what_c_cannot_hold_is_refused() -> None:
 
 def test_what_the_model_would_refuse_at_its_begin_is_refused() -> None:
     subject = paper_subject()
-    for told, model in (
+    for reported, model in (
         ("k_o = -1 N", replace(subject.model, k_o=-1.0)),
         ("eta = 85 1", replace(subject.model, eta=85.0)),
         ("J_out = 0 kg", replace(subject.model, J_out=0.0)),
         ("i_f = 0 1", replace(subject.model, i_f=0.0)),
     ):
-        with pytest.raises(InputError, match=f"{told}.* is impossible"):
+        with pytest.raises(InputError, match=f"{reported}.* is impossible"):
             write_source(replace(subject, model=model))
 
 

@@ -156,13 +156,13 @@ def test_inputs_with_their_rates_meet_the_tight_reference(built: Built, instance
     case = built.case
     subject = case.subject
     instance.initialize(case.inputs[0])
-    told = instance.run(case, 0, case.time.size - 1)
+    reported = instance.run(case, 0, case.time.size - 1)
     kind = InputKind.LINEAR if instance.is_fmi2 else InputKind.HOLD
     core = run_core(subject.model, subject.start, case.time, case.inputs, kind)
-    for column, expected in zip(told.T, (core.engine_speed, core.shaft_torque), strict=True):
+    for column, expected in zip(reported.T, (core.engine_speed, core.shaft_torque), strict=True):
         assert np.abs(column - expected[1:]).max() < 1e-9 * np.abs(expected).max()
     if instance.is_fmi2:
-        torque = np.concatenate([[core.shaft_torque[0]], told[:, 1]])
+        torque = np.concatenate([[core.shaft_torque[0]], reported[:, 1]])
         assert case.deviation(torque) < 1e-3
 
 
@@ -199,7 +199,7 @@ def test_parameters_are_tuned_while_it_runs(built: Built, instance: Instance) ->
 
 
 @pytest.mark.parametrize(
-    ("reference", "value", "told"),
+    ("reference", "value", "reported"),
     [
         ("k_o", -1.0, "parameter out of range: k_o"),
         ("start.engine_speed", float("nan"), "not a finite number"),
@@ -207,7 +207,7 @@ def test_parameters_are_tuned_while_it_runs(built: Built, instance: Instance) ->
     ],
 )
 def test_bad_values_are_errors_with_a_message(
-    built: Built, instance: Instance, reference: str, value: float, told: str
+    built: Built, instance: Instance, reference: str, value: float, reported: str
 ) -> None:
     def start() -> None:
         instance.set([reference], [value])
@@ -215,7 +215,7 @@ def test_bad_values_are_errors_with_a_message(
 
     with pytest.raises(FMICallException):
         start()
-    assert any(told in message for message in instance.messages)
+    assert any(reported in message for message in instance.messages)
 
 
 def test_calls_out_of_order_are_errors_and_no_crash(built: Built, instance: Instance) -> None:
@@ -240,10 +240,10 @@ def test_calls_out_of_order_are_errors_and_no_crash(built: Built, instance: Inst
 def test_the_parameter_set_inside_names_what_can_be_tuned(built: Built, tmp_path: Path) -> None:
     with zipfile.ZipFile(built.path) as archive:
         archive.extract("resources/parameters.ssv", tmp_path)
-    told = read_parameters(tmp_path / "resources" / "parameters.ssv").scalars
+    reported = read_parameters(tmp_path / "resources" / "parameters.ssv").scalars
     description = fmpy.read_model_description(str(built.path))
     tunable = {v.name: v for v in description.modelVariables if v.variability == "tunable"}
-    assert {one.name: one.value for one in told} == {
+    assert {one.name: one.value for one in reported} == {
         name: float(variable.start) for name, variable in tunable.items()
     }
 
@@ -262,7 +262,7 @@ def test_importers_that_set_values_only_meet_the_reference_inside(built: Built) 
     signals = np.array(
         [tuple(row) for row in stimulus.tolist()], dtype=[(name, float) for name in names]
     )
-    told = fmpy.simulate_fmu(
+    reported = fmpy.simulate_fmu(
         str(built.path),
         start_time=stimulus[0, 0],
         stop_time=stimulus[-1, 0],
@@ -274,7 +274,7 @@ def test_importers_that_set_values_only_meet_the_reference_inside(built: Built) 
         fmi_type="CoSimulation",
     )
     for column, expected in (("engine_speed", result[:, 1]), ("output_torque", result[:, 5])):
-        assert np.abs(told[column] - expected).max() < 1e-9 * np.abs(expected).max()
+        assert np.abs(reported[column] - expected).max() < 1e-9 * np.abs(expected).max()
 
 
 def test_sources_inside_are_complete(built: Built, tmp_path: Path) -> None:
@@ -314,5 +314,5 @@ def test_any_name_is_one_that_fmpy_accepts(
     named = replace(subject, model=model, start=start, name="twin of " * 1000)
     build_fmu(named, path, BuildOptions(version))
     assert validate_fmu(str(path)) == []
-    told = {one.name for one in fmpy.read_model_description(str(path)).modelVariables}
-    assert {f"{name}.{end}" for name in expected for end in ("P0", "pressure", "slip")} <= told
+    reported = {one.name for one in fmpy.read_model_description(str(path)).modelVariables}
+    assert {f"{name}.{end}" for name in expected for end in ("P0", "pressure", "slip")} <= reported

@@ -51,7 +51,7 @@ def test_libcosim_runs_it_as_the_core_does(tmp_path: Path) -> None:
         rows.append(observer.last_real_values(twin, OUTPUTS))
     subject = case.subject
     core = run_core(subject.model, subject.start, time, given, InputKind.HOLD)
-    for told, expected in zip(
+    for reported, expected in zip(
         np.array(rows).T, (core.engine_speed, core.shaft_torque), strict=True
     ):
-        assert np.abs(told - expected[1:]).max() < 1e-9 * np.abs(expected).max()
+        assert np.abs(reported - expected[1:]).max() < 1e-9 * np.abs(expected).max()

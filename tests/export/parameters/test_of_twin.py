@@ -21,10 +21,10 @@ def test_a_value_of_the_card_states_no_interval() -> None:
     """Its deviation is zero, and an interval without width would tell it as known exactly."""
     known = Estimate("P0.B3", 8e4, 0.0, Verdict.DESIGN, "card")
     given = twin()
-    told = collect_parameters(replace(given, parameters={**given.parameters, "P0.B3": known}))[
+    reported = collect_parameters(replace(given, parameters={**given.parameters, "P0.B3": known}))[
         "P0.B3"
     ]
-    assert told.text == "pressure at which the clutch fill ends; design value"
+    assert reported.text == "pressure at which the clutch fill ends; design value"
 
 
 def test_an_identified_value_goes_before_the_design_value() -> None:
@@ -43,8 +43,8 @@ def test_an_identified_drum_stands_once(ending: str, value: float) -> None:
         0.0,
         0.05,
     ]
-    told = Estimate(name, value, 0.01, Verdict.IDENTIFIED, "likelihood")
-    content = collect_parameters(replace(given, parameters={**given.parameters, name: told}))
+    reported = Estimate(name, value, 0.01, Verdict.IDENTIFIED, "likelihood")
+    content = collect_parameters(replace(given, parameters={**given.parameters, name: reported}))
     drums = {one.name: one for one in content.scalars if "drum" in one.name}
     assert set(drums) == {"drum.B2", name}
     assert drums[name].value == value
@@ -61,8 +61,8 @@ def test_the_curve_keeps_to_a_law_that_bends_near_zero_slip(v_s: float, mu_s: fl
     assert isinstance(curve, Curve)
     assert (curve.axis.points[-1], len(curve.axis.points)) == (300.0, 33)
     slip = np.linspace(0.0, 300.0, 20001)
-    told = np.interp(slip, curve.axis.points, curve.values)
-    assert told == pytest.approx(law.evaluate(slip), rel=1e-3)
+    reported = np.interp(slip, curve.axis.points, curve.values)
+    assert reported == pytest.approx(law.evaluate(slip), rel=1e-3)
 
 
 def test_a_converter_brings_two_curves_over_the_speed_ratio() -> None:

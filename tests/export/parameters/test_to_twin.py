@@ -51,10 +51,10 @@ def test_edited_values_reach_the_simulation(kind: ParameterFormat) -> None:
     assert update_twin(twin(), _edited(eta=0.9)).twin.covariance is None
 
 
-@pytest.mark.parametrize("told", [False, True])
-def test_every_name_that_is_told_as_changed_acts(told: bool) -> None:
+@pytest.mark.parametrize("reported", [False, True])
+def test_every_name_that_is_told_as_changed_acts(reported: bool) -> None:
     given = replace(twin(), load_law=LoadLaw(aero=7.0, std=0.5, mean_speed=14.0))
-    if told:
+    if reported:
         drum = Estimate("drum.B3", 0.07, 0.01, Verdict.IDENTIFIED, "likelihood")
         given = replace(given, parameters={**given.parameters, "drum.B3": drum})
     changed: list[str] = []

@@ -98,9 +98,9 @@ def test_an_odd_unit_is_told_by_the_command(
     store: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["fleet", "estimate", str(store.folder), "--parameter", "mu.B3"]) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "Units beyond what chance makes. They count in shared value and spread." in told
-    assert "T4 μ (B3) 0.04" in told
+    reported = " ".join(capsys.readouterr().out.split())
+    assert "Units beyond what chance makes. They count in shared value and spread." in reported
+    assert "T4 μ (B3) 0.04" in reported
     page = tmp_path / "page.html"
     assert main(["fleet", "report", str(store.folder), "-o", str(page)]) == 0
     text = page.read_text("utf-8")

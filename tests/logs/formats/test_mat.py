@@ -81,8 +81,8 @@ def test_arrays_of_structs_hold_named_signals(tmp_path: Path) -> None:
 
 
 def test_time_in_another_unit(tmp_path: Path) -> None:
-    told = read(tmp_path, {"t": T * 1e3, "t_unit": "ms", "x": T})
-    assert told.channels[0].time == pytest.approx(T)
+    reported = read(tmp_path, {"t": T * 1e3, "t_unit": "ms", "x": T})
+    assert reported.channels[0].time == pytest.approx(T)
     asserted = read(tmp_path, {"t": T * 1e3, "x": T}, ReadOptions(TimeColumn(unit="ms")))
     assert asserted.channels[0].time == pytest.approx(T)
     with pytest.raises(UnitError, match="unknown time unit 'fortnight'"):

@@ -39,12 +39,12 @@ def powered(ratio: float, share: float) -> dict[str, Channel]:
 
 
 @pytest.mark.parametrize(
-    ("share", "told"), [(0.9, False), (0.65, False), (0.45, True), (1.8, True)]
+    ("share", "reported"), [(0.9, False), (0.65, False), (0.45, True), (1.8, True)]
 )
-def test_a_torque_of_the_wrong_scale_is_told(tmp_path: Path, share: float, told: bool) -> None:
+def test_a_torque_of_the_wrong_scale_is_told(tmp_path: Path, share: float, reported: bool) -> None:
     texts = check_torque_balance(powered(1.8, share), card(tmp_path))
-    assert bool(texts) == told
-    if told:
+    assert bool(texts) == reported
+    if reported:
         assert f"In gear 2 the output torque is {share:.2f} of ratio times" in texts[0].text
 
 

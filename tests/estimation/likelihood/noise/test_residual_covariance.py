@@ -87,10 +87,10 @@ def test_a_torque_computed_from_the_compared_speed_has_its_noise() -> None:
     assert np.diag(columns.T @ whiteness.apply_inverse(columns)) == pytest.approx(
         np.diag(columns.T @ expected), rel=1e-4
     )
-    told = whiteness.estimate_input_noise(columns[:, 0])[TORQUE]
+    reported = whiteness.estimate_input_noise(columns[:, 0])[TORQUE]
     common = share @ np.diag(record.sigma**2) @ own.T - power[TORQUE][:, None] * effect[TORQUE].T
     best = common @ expected[:, 0]
-    assert np.max(np.abs(told - best)) < 1e-3 * np.max(np.abs(best))
+    assert np.max(np.abs(reported - best)) < 1e-3 * np.max(np.abs(best))
 
 
 def test_its_determinant_is_that_of_the_dense_covariance() -> None:
