@@ -11,6 +11,7 @@ import pytest
 
 from drivetwin.authoring.sensor_classes import read_sensor_classes
 from drivetwin.vehicle.card import load_card
+from tests.support.bus_logs import BUS_LOGS, write_bus_logs
 from tools.run_page import BLOCK, DOCS, find_outdated, run_line, run_page
 
 HOWTO = DOCS / "howto"
@@ -69,6 +70,11 @@ def test_a_long_page_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)
     for line in LONG[name]:
         run_line(line)
+    if name == "fleet.md":  # bus logs of vehicles
+        write_bus_logs(tmp_path)
+        for vehicle, log in enumerate(BUS_LOGS[:2]):
+            (tmp_path / f"trucks/{vehicle}").mkdir(parents=True)
+            (tmp_path / log).rename(tmp_path / f"trucks/{vehicle}/{log}")
     run_page(HOWTO / name, with_code=name not in FRAGMENTS)
 
 
