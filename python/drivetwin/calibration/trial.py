@@ -11,7 +11,6 @@ from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 from scipy.constants import g, zero_Celsius
 
@@ -21,7 +20,7 @@ from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.certificate import Certificate, certify
 from drivetwin.calibration.evaluate import Plant, get_vehicle_inertias
 from drivetwin.calibration.guarded_controller import run_guarded
-from drivetwin.calibration.metrics import Metric, Outcome, Runs, compute_metrics, list_outputs
+from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list_outputs
 from drivetwin.calibration.objective import build_limit_keys
 from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policy import Space
@@ -43,7 +42,6 @@ _REST = 0.05
 """Distance of the inputs from those of the new gear at the end, over system pressure and torque
 demand, up to which a shift counts as finished: beyond the error of a usual command."""
 _Factor = Annotated[float, Field(gt=0, le=20)]
-_Time = Annotated[float, Field(ge=0, le=1000)]
 
 
 class Scale(StrEnum):
@@ -96,8 +94,8 @@ class SignalFault:
     def numbers(self) -> tuple[float, ...]:
         """Numbers of drivetwin_bench.c."""
         commands = ("command_engine_torque", "command_offgoing", "command_oncoming")
-        place = (*SIGNALS, *commands).index(self.signal)
-        return (float(place), self.begin, self.end, self.delay, float(self.every))
+        place = float((*SIGNALS, *commands).index(self.signal))
+        return (place, self.begin, self.end, self.delay, float(self.every))
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,7 @@ class Scenario:
     fill: _Factor = 1.0
     lag: _Factor = 1.0
     dead_time: Annotated[float, Field(ge=0, le=0.4, alias="dead_time_s")] = 0.0
-    wait: Annotated[_Time, Field(alias="wait_s")] = 0.0
+    wait: Annotated[float, Field(ge=0, le=1000, alias="wait_s")] = 0.0
     duration: Annotated[float, Field(gt=0, le=20, alias="duration_s")] = 1.5
     pedal: Annotated[tuple[tuple[float, float], ...], Field(min_length=1)] = ((0.0, 1.0),)
     faults: tuple[SignalFault, ...] = ()
@@ -139,16 +137,15 @@ class Scenario:
 
     def list_numbers(self, task: float) -> tuple[float, ...]:
         """List the numbers of drivetwin_bench.c; `task` [s] is the time between two commands."""
-        times, factors = zip(*self.pedal, strict=True)
+        pedal = [one for column in zip(*self.pedal, strict=True) for one in column]
         faults = [number for one in self.faults for number in one.numbers]
-        body = (task, self.wait, len(times), *times, *factors, len(self.faults), *faults)
+        body = (task, self.wait, len(self.pedal), *pedal, len(self.faults), *faults)
         return (len(body) + 1.0, *map(float, body))
 
     def change_model(self, model: DualClutch, radius: float) -> DualClutch:
         """Return a driveline with mass, grade and gains of the scenario; wheel `radius` [m]."""
-        inertia = self.mass * model.J_v
+        inertia, (old, new) = self.mass * model.J_v, model.elements
         climb = inertia / radius * g * math.sin(math.atan(self.grade))
-        old, new = model.elements
         return replace(
             model,
             J_v=inertia,
@@ -244,12 +241,9 @@ def run_trials(
         scenario in which it happens.
     """
 
-    def run(some: Sequence[Scenario]) -> list[Trial]:
-        found: list[Trial] = run_guarded(given.library, simulate_trials, twin, request, given, some)
-        return found
-
+    run = partial(run_guarded, given.library, simulate_trials, twin, request, given)
     try:
-        return run(scenarios)
+        return list(run(scenarios))
     except ControllerError:  # it ended the child: each scenario gets one of its own
         return [_catch(partial(run, (scenarios[0], one)), one) for one in scenarios]
 
@@ -296,12 +290,10 @@ def build_trial_task(
     shift, draw, actuators = task.maneuver, task.draw.driveline, task.draw.actuators
     assert actuators is not None
 
-    def change(model: DualClutch) -> DualClutch:
-        return scenario.change_model(model, shift.wheel_radius)
+    change = partial(scenario.change_model, radius=shift.wheel_radius)
 
     def draw_driveline(random: np.random.Generator) -> MakeDriveline | None:
-        make = draw(random)
-        if make is None:
+        if (make := draw(random)) is None:
             return None
         return lambda random: replace(made := make(random), model=change(made.model))
 
@@ -309,8 +301,7 @@ def build_trial_task(
         make = actuators(random)
         return lambda random: scenario.change_unit(make(random))
 
-    horizon = shift.request + scenario.duration
-    changed = replace(shift, model=change(shift.model), horizon=horizon)
+    changed = replace(shift, model=change(shift.model), horizon=shift.request + scenario.duration)
     return replace(task, maneuver=changed, draw=Draw(draw_driveline, draw_actuators))
 
 
@@ -322,11 +313,13 @@ def _simulate_trial(task: Task, scenario: Scenario, first: Sequence[Trial]) -> l
     drawn = draw_scenarios(shift, task.draw, scenario.draws, task.seed, Purpose.CERTIFICATE)
     runs = Plant(shift, task.settings.threads).simulate(control, drawn, list_outputs(shift))
     outcome = compute_metrics(shift, runs, get_vehicle_inertias(shift, drawn))
-    unfinished = _find_unfinished(runs, control, scenario.pedal[-1][1])
-    marks = zip((UNLOCKED, RELOCKED, UNFINISHED), (outcome.unlocked, outcome.relocked, unfinished),
-                strict=True)  # fmt: skip
-    values: dict[str, FloatArray] = {name: one.astype(np.float64) for name, one in marks}
-    values |= {name.value: one for name, one in outcome.values.items()}
+    assert runs.inputs is not None
+    values: dict[str, FloatArray] = {
+        UNLOCKED: outcome.unlocked.astype(np.float64),
+        RELOCKED: outcome.relocked.astype(np.float64),
+        UNFINISHED: _find_unfinished(runs.inputs, control, scenario.pedal[-1][1]),
+        **{name.value: one for name, one in outcome.values.items()},
+    }
     nominal = first[0].outcome if first and first[0].outcome else outcome
     scales = {**values, **{name.value: one for name, one in nominal.values.items()}}
     checks = []
@@ -346,18 +339,16 @@ def _simulate_trial(task: Task, scenario: Scenario, first: Sequence[Trial]) -> l
     worst = max(checks, key=lambda one: (one.failed > 0, one.worst / max(one.bound, 1e-9)),
                 default=None)  # fmt: skip
     place = int(outcome.values[Metric.PEAK_JERK].argmax()) if worst is None else worst.place
-    assert runs.inputs is not None
-    names = (*(" of ".join(one) for one in list_outputs(shift)), *INPUTS)
-    columns = (*runs.columns[place], *runs.inputs[place])
-    signals = {"time": shift.time - shift.request, **dict(zip(names, columns, strict=True))}
+    names = ("time", *(" of ".join(one) for one in list_outputs(shift)), *INPUTS)
+    columns = (shift.time - shift.request, *runs.columns[place], *runs.inputs[place])
+    signals = dict(zip(names, columns, strict=True))
     certificate = certify(outcome, (), task.settings.confidence)
     return [Trial(scenario, outcome, certificate, tuple(checks), place, signals)]
 
 
-def _find_unfinished(runs: Runs, control: ClosedLoop, pedal: float) -> NDArray[np.bool_]:
-    """Find runs (runs,) whose inputs at the end are not those of the new gear."""
-    assert runs.inputs is not None
-    torque, old, new = np.moveaxis(runs.inputs[:, :3, -1], 1, 0)
+def _find_unfinished(inputs: FloatArray, control: ClosedLoop, pedal: float) -> FloatArray:
+    """Return 1 for runs (runs,) whose inputs at the end are not those of the new gear, else 0."""
+    torque, old, new = np.moveaxis(inputs[:, :3, -1], 1, 0)
     demand, pressure = pedal * control.controller.engine_torque, control.controller.system_pressure
     away = np.abs([(torque - demand) / demand, old / pressure, new / pressure - 1.0])
-    return np.asarray(~(away < _REST).all(axis=0))
+    return np.asarray((away >= _REST).any(axis=0), dtype=np.float64)

@@ -59,8 +59,8 @@ def _compare(first: Trial, second: Trial) -> list[Difference]:
         return []
     found = []
     for metric, before in first.outcome.values.items():
-        after = second.outcome.values[metric]
-        change, pairs = after - before, before.size
+        after, pairs = second.outcome.values[metric], before.size
+        change = after - before
         middle, spread = float(change.mean()), float(change.std(ddof=1)) if pairs > 1 else np.inf
         half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, max(pairs - 1, 1))) * spread / np.sqrt(pairs)
         p = float(wilcoxon(change).pvalue) if np.any(change) else 1.0

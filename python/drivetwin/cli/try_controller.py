@@ -97,5 +97,5 @@ def _run(twin: Twin, trials: TrialFile, request: Try, path: Path) -> list[Trial]
     )
     scenarios = trials.list_scenarios(request.shift, request.draws)
     with compile_controller(path, bench=True) as given, show_step(f"testing {path.name}"):
-        own = replace(given, task=request.task or given.task)
-        return run_trials(twin, asked, own, scenarios)
+        timed = replace(given, task=request.task or given.task)
+        return run_trials(twin, asked, timed, scenarios)

@@ -269,8 +269,8 @@ def _build_comparison(found: Sequence[Difference]) -> TableBlock:
         *("scenario", "metric", ("pairs", "d"), ("A", "s"), ("B", "s")),
         *(("B - A from", "s"), ("to", "s"), ("B - A [%]", "+.1f"), ("p", "s")),
     )
-    caption = f"Differences of B to A: {len(rows)} of {len(found)} metrics (Wilcoxon and Holm, 5 %)"
-    return make_table(caption, columns, rows)
+    counted = f"{len(rows)} of {len(found)} metrics (Wilcoxon and Holm, 5 %)"
+    return make_table(f"Differences of B to A: {counted}", columns, rows)
 
 
 def _plot_run(of: Mapping[str, FloatArray]) -> Figure:
@@ -281,12 +281,11 @@ def _plot_run(of: Mapping[str, FloatArray]) -> Figure:
         ]
 
     commands = draw("command.offgoing", "command.oncoming", dash="dot")
-    slips = [name for name in of if name.startswith("slip")]
-    demand = draw("command.engine_torque", dash="dot")
+    torques = [*draw("engine_torque"), *draw("command.engine_torque", dash="dot")]
     panels = [
         Panel("pressure", BAR, [*draw("pressure.offgoing", "pressure.oncoming"), *commands]),
-        Panel("engine torque", NM, [*draw("engine_torque"), *demand]),
-        Panel("slip", Display("rad/s"), draw(*slips)),
+        Panel("engine torque", NM, torques),
+        Panel("slip", Display("rad/s"), draw(*(name for name in of if name.startswith("slip")))),
         Panel("output torque", NM, draw("shaft_torque of output shaft")),
     ]
     return plot_over_time_axis(panels, compute_full_range(panels), 720)
