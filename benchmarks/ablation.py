@@ -158,7 +158,7 @@ def find_idle(found: Identification, stages: Mapping[str, float]) -> list[str]:
         Mechanism.LOAD_TERMS: len(found.shifts) == 1 and not is_restricted,
         Mechanism.FAR_MODES: all(stages.get(one, 0.0) < IDLE for one in far),
         Mechanism.MODE_AVERAGE: "model selection/averaging" not in stages,
-        Mechanism.LOWER_GEAR: is_selected,
+        Mechanism.BACKLASH_FIRST: is_selected,
         Mechanism.ADMISSION: all(one.code is not Code.EFFECT_EXCLUDED for one in found.findings),
         Mechanism.PLANTS: "plant/first refit" not in stages,
     }

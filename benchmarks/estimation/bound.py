@@ -14,7 +14,8 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.output import IndexArray
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.estimation.likelihood.motion import simulate_motion
+from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
@@ -37,7 +38,7 @@ def compute_noise(bench: Bench, role: str) -> float:
 
 
 def compute_bound(
-    bench: Bench, term: ShiftTerm, truth: ParameterVector, prior: Prior
+    bench: Bench, term: DualClutchTerm, truth: ParameterVector, prior: Prior
 ) -> FloatArray:
     """Compute the least covariance (p, p) of the unknowns; `bench` and `part` have no noise."""
     found = term.linearise(truth)
@@ -62,9 +63,9 @@ def compute_bound(
     return np.asarray(inverse / np.outer(scale, scale))
 
 
-def compute_response(bench: Bench, term: ShiftTerm, truth: ParameterVector) -> FloatArray:
+def compute_response(bench: Bench, term: DualClutchTerm, truth: ParameterVector) -> FloatArray:
     """Compute G·Q^½ (n, m): change of the outputs by one sigma of each input sample that acts."""
-    base = term.simulate(truth)
+    base = simulate_motion(term, truth)
     assert base is not None
     start = term.record.sample_run(base)
     columns = []
@@ -87,18 +88,18 @@ def _is_seen(change: FloatArray) -> bool:
 
 
 def _compute_change(
-    term: ShiftTerm, truth: ParameterVector, start: FloatArray, name: str, samples: IndexArray
+    term: DualClutchTerm, truth: ParameterVector, start: FloatArray, name: str, samples: IndexArray
 ) -> FloatArray:
     """Compute the change of the outputs (n,) from `start`, which they are at the truth, per unit of
     a common disturbance of samples of an input.
     """
     step = STEPS.get(name, PRESSURE_STEP)
-    run = _disturb(term, name, samples, step).simulate(truth)
+    run = simulate_motion(_disturb(term, name, samples, step), truth)
     assert run is not None
     return (term.record.sample_run(run) - start) / step
 
 
-def _can_act(term: ShiftTerm, name: str, stamp: float) -> bool:
+def _can_act(term: DualClutchTerm, name: str, stamp: float) -> bool:
     """Return whether a sample can act: a pressure does not while its element is fully engaged."""
     time = term.record.time
     if name == "engine torque":
@@ -109,7 +110,7 @@ def _can_act(term: ShiftTerm, name: str, stamp: float) -> bool:
     return bool(time[0] < stamp < time[-1]) and value > low
 
 
-def _disturb(term: ShiftTerm, name: str, samples: IndexArray, step: float) -> ShiftTerm:
+def _disturb(term: DualClutchTerm, name: str, samples: IndexArray, step: float) -> DualClutchTerm:
     record = term.record
     signal = record.inputs[name]
     values = signal.values.copy()

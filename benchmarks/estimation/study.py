@@ -19,10 +19,9 @@ from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
-from drivetwin.estimation.likelihood.parametrization import LAW
+from drivetwin.estimation.likelihood.parametrization import LAW, DualClutchProblem
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.select_model import select_model
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
@@ -159,7 +158,9 @@ def build_guess(bench: Bench) -> dict[str, float]:
     return values
 
 
-def build_point(problem: ShiftObjective, start: ParameterVector, bench: Bench) -> ParameterVector:
+def build_point(
+    problem: DualClutchProblem, start: ParameterVector, bench: Bench
+) -> ParameterVector:
     """Return the point of the truth, its start state included."""
     run, time = bench.run.trajectory, problem.terms[0].record.time[0]
     k = int(np.searchsorted(run.time, time))
@@ -174,7 +175,7 @@ def build_point(problem: ShiftObjective, start: ParameterVector, bench: Bench) -
 
 
 def propagate(
-    problem: ShiftObjective,
+    problem: DualClutchProblem,
     point: ParameterVector,
     covariance: FloatArray,
     signals: ShiftSignals,

@@ -22,11 +22,11 @@ from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
 from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, build_record
-from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET
+from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE, TORQUE, build_record
+from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET, DualClutchTerm
 from drivetwin.estimation.likelihood.priors import split_spans
-from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS, get_modes
+from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.method import DEFAULT_METHOD
@@ -185,9 +185,9 @@ def compute_widths(found: Identification, recorded: DynoRun) -> dict[str, tuple[
     bench = Bench(exact, old.plant.driveline, dict(recorded.truth.parameters), ideal)
     sensors = {sensor.role: sensor for sensor in recorded.scenario.sensors}
     means = SPEEDS if sensors["input_speed"].window > 0.0 else ()
-    curved = {TORQUE} & fit.problem.modes
+    curved = {TORQUE} & get_modes(fit.problem)
     record = build_record(exact, split_spans([exact])[0]).select_modes({*means, *curved})
-    term = ShiftTerm.from_sensor_noise(old.plant, record)
+    term = RecordedTerm.from_sensor_noise(old.plant, record)
     start = fit.point.replace_values(_build_values(fit.point, term, bench))
     truth = build_point(replace(fit.problem, terms=(term,)), start, bench)
     least = compute_bound(bench, term, truth, fit.problem.prior)
@@ -218,12 +218,12 @@ def _read_exactly(signals: ShiftSignals, ideal: DynoRun) -> ShiftSignals:
     )
 
 
-def _build_values(point: ParameterVector, term: ShiftTerm, bench: Bench) -> FloatArray:
+def _build_values(point: ParameterVector, term: DualClutchTerm, bench: Bench) -> FloatArray:
     """Return the truth by unknown (p,), torques over η if the fit has them so; starts unchanged."""
     model = bench.run.scenario.model
     truth = {**build_guess(bench), TE_OFFSET: 0.0, AERO: model.load.aero}
     truth["Tv_over_if"] += model.load.aero * term.plant.mean_speed**2 / model.i_f
-    if not term.scale_known:
+    if not term.compares(OUTPUT_TORQUE):
         truth = _scale(truth, model)
     return np.array([truth.get(n, v) for n, v in zip(point.names, point.values, strict=True)])
 

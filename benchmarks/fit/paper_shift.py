@@ -22,8 +22,8 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.data.recorded_data import RECORD
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
 from drivetwin.estimation.likelihood.priors import build_problem
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance
@@ -100,7 +100,7 @@ def fit_both(seed: int) -> tuple[Fitted, Fitted]:
     law = scenario.model.loss_law
     problem, start = build_problem([bench.signals], [bench.driveline], law, guess)
     first = time.process_time() - began
-    found = fit_multistart(problem, start, [bench.signals.shift])
+    found = fit_multistart(problem, start)
     values = propagate(problem, found.mean, found.covariance, bench.signals)
     likelihood = Fitted(values, time.process_time() - began)
     began = time.process_time()
@@ -109,7 +109,7 @@ def fit_both(seed: int) -> tuple[Fitted, Fitted]:
 
 
 def _fit_network(
-    bench: Bench, problem: LikelihoodObjective[ShiftTerm], start: ParameterVector
+    bench: Bench, problem: LikelihoodObjective[DualClutchTerm], start: ParameterVector
 ) -> dict[str, tuple[float, float]]:
     term = problem.terms[0]
     dual = term.plant.build_model(start)

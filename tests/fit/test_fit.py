@@ -234,7 +234,7 @@ def test_a_search_without_explanation_ends_at_its_work_limit(
         name: replace(one, values=one.values * (1.0 + 0.02 * np.sin(19.0 * one.time)))
         for name, one in made.recording.outputs.items()
     }
-    monkeypatch.setattr(search, "FIT_SEARCH", replace(search.FIT_SEARCH, work=200.0))
+    monkeypatch.setattr(search, "FIT_SEARCH", replace(search.FIT_SEARCH, work=300.0))
     found = fit_network(made.model, [replace(made.recording, outputs=outputs)])
     assert Code.SEARCH_LIMITED in {one.code for one in found.findings}
     assert found.status is ModelStatus.NOT_VALID

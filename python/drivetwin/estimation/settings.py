@@ -13,13 +13,13 @@ from drivetwin.estimation.likelihood import coloured_noise, objective, priors
 from drivetwin.estimation.likelihood.data import input_smoothing, recorded_data
 from drivetwin.estimation.likelihood.effects import causes, correction, joint_step
 from drivetwin.estimation.likelihood.noise import residual_covariance
-from drivetwin.estimation.likelihood.optimize import initial_guess, multistart
+from drivetwin.estimation.likelihood.optimize import initial_guess, multistart, search
 from drivetwin.estimation.optimize import gauss_newton
 from drivetwin.estimation.result import prior_conflict, verdict
 
 _STAGES = (
     *(noise, select_shifts, segments, momentum_balance, load_balance, initial_guess),
-    *(recorded_data, input_smoothing, priors, multistart, gauss_newton, objective),
+    *(recorded_data, input_smoothing, priors, multistart, search, gauss_newton, objective),
     *(residual_covariance, coloured_noise, causes, joint_step, correction),
     *(verdict, prior_conflict, identification),
 )

@@ -25,7 +25,7 @@ from scipy.special import logsumexp
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import Quantity
 from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.optimize.gauss_newton import GaussNewtonSettings, OptimizeResult, minimise
+from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import EXPLAINED
 from drivetwin.fit.fixed_numbers import FixedNumber, Source
@@ -111,9 +111,7 @@ class CompletedFit:
     spread: FloatArray
 
 
-def complete_model(
-    found: OptimizeResult[Problem], stated: Collection[str], settings: GaussNewtonSettings
-) -> CompletedFit:
+def complete_model(found: OptimizeResult[Problem], stated: Collection[str]) -> CompletedFit:
     """Put the omissions that the recordings show into the model, and minimise again.
 
     Parameters
@@ -122,8 +120,6 @@ def complete_model(
         Minimum of the model as stated.
     stated
         Paths whose distribution is stated: nothing is left out there.
-    settings
-        Settings of the search.
     """
     stated_model, found = found, _extend_inputs(found)
     candidates = _list_omissions(found, stated)
@@ -134,9 +130,9 @@ def complete_model(
         best = max(weighed, key=lambda one: one.nats, default=None)
         if best is not None and best.weight >= 1.0:
             candidates = [one for one in candidates if one is not best.omission]
-            nats, better = best.nats, _put_into_model(found, best, settings)
+            nats, better = best.nats, _put_into_model(found, best)
         elif plays and not is_explained(found):
-            nats, better = _put_play(found, plays.pop(), settings)
+            nats, better = _put_play(found, plays.pop())
         else:
             break
         if better is not None:
@@ -332,11 +328,11 @@ def _weigh(one: Omission, own: float, pull: float, moves: FloatArray) -> _Weighe
 
 
 def _put_play(
-    found: OptimizeResult[Problem], play: Omission, settings: GaussNewtonSettings
+    found: OptimizeResult[Problem], play: Omission
 ) -> tuple[float, OptimizeResult[Problem] | None]:
     """Minimise with a play; return the log evidence, and None where it is not shown."""
     problem, point = _admit(found, [play])
-    first = minimise(problem, point, settings=settings)
+    first = minimise(problem, point)
     if first is None:
         return 0.0, None
     counted = max(first.normal.cost / problem.size, 1.0)
@@ -344,7 +340,7 @@ def _put_play(
     if OMISSIONS.odds * math.exp(min(nats, 700.0)) < 1.0:
         return nats, None
     again = first.problem.update_weighting(first.point)
-    return nats, minimise(again, first.point, settings=settings)
+    return nats, minimise(again, first.point)
 
 
 def is_explained(found: OptimizeResult[Problem]) -> bool:
@@ -354,7 +350,7 @@ def is_explained(found: OptimizeResult[Problem]) -> bool:
 
 
 def _put_into_model(
-    found: OptimizeResult[Problem], one: _Weighed, settings: GaussNewtonSettings
+    found: OptimizeResult[Problem], one: _Weighed
 ) -> OptimizeResult[Problem] | None:
     """Minimise with an omission as last coordinate; None where that falls short of its evidence."""
     number = replace(one.omission, size=one.likeliest * one.omission.size)
@@ -362,8 +358,8 @@ def _put_into_model(
     start = np.append(found.point.values + one.amount * one.moves, one.amount)
     start = np.clip(start, problem.lower, problem.upper)
     for values in (start, point.values):
-        first = minimise(problem, point.replace_values(values), settings=settings)
+        first = minimise(problem, point.replace_values(values))
         if first is not None and first.normal.cost < found.normal.cost:
             again = first.problem.update_weighting(first.point)
-            return minimise(again, first.point, settings=settings)
+            return minimise(again, first.point)
     return None

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.data.output import Channel
 from drivetwin.estimation.likelihood.data.recorded_data import RecordedData
@@ -25,7 +23,7 @@ from drivetwin.simulation.network_sensitivity import NetworkTask
 
 
 @dataclass(frozen=True, eq=False)
-class Plant(RecordedPlant):
+class Plant(RecordedPlant[RecordedData]):
     """Network of one recording.
 
     `inputs` are those that no channel gives, `levels` the constant ones among them, `sizes` the
@@ -78,22 +76,6 @@ class Plant(RecordedPlant):
         """List the coordinates that act on numbers by which the core has no derivatives."""
         plain = (name for name, place in self._acting if not place.schema.differentiable)
         return list(dict.fromkeys(plain))
-
-    def list_common(self) -> set[str]:
-        """List the unknowns that act on numbers which runs side by side have in common."""
-        return {name for one, place in self._settings if _is_common(place) for name in one.of}
-
-    def compute_sets(self, draws: FloatArray) -> dict[str, FloatArray]:
-        """Compute the values (n,) by path that `draws` (n, k) of the unknowns set in n runs."""
-        rows = [
-            {one.name: one.to_value(x) for one, x in zip(self.sought, row, strict=True)}
-            for row in draws.tolist()
-        ]
-        return {
-            one.path: np.array([one.compute(*(row[name] for name in one.of)) for row in rows])
-            for one, place in self._settings
-            if not _is_common(place)
-        }
 
     def get_step(self, name: str) -> float:
         """Return the step of a coordinate for a difference of runs."""
@@ -178,12 +160,6 @@ class Plant(RecordedPlant):
             for keys in fixed.places:
                 numbers.put(keys, fixed.move(numbers.get(keys), x))
         return numbers.tables
-
-
-def _is_common(place: Place) -> bool:
-    """Return whether runs side by side have a number in common: of a channel or a table."""
-    is_own = place.field == "start" or place.keys[0] == "elements"
-    return not (is_own and place.schema.differentiable)
 
 
 _SHARE = 1e-6

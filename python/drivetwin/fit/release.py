@@ -17,13 +17,13 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.optimize.gauss_newton import (
-    GaussNewtonSettings,
     OptimizeResult,
     minimise,
 )
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.plant import Problem
+from drivetwin.vehicle.spec import PriorValue
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,6 @@ def release_fixed(
     found: OptimizeResult[Problem],
     fixed: Sequence[FixedNumber],
     count: int,
-    settings: GaussNewtonSettings,
 ) -> tuple[OptimizeResult[Problem], tuple[FixedNumber, ...]]:
     """Minimise over the fixed numbers as well, each within its distribution.
 
@@ -58,8 +57,6 @@ def release_fixed(
         Numbers beside the unknowns.
     count
         Number of unknowns of the network, which come first in the vector.
-    settings
-        Settings of the search.
 
     Returns
     -------
@@ -72,7 +69,7 @@ def release_fixed(
         return found, ()
     problem, point = extend(found.problem, found.point, kept)
     for _ in range(2):  # the second with the weighting of the common minimum
-        best = minimise(problem, point, settings=settings)
+        best = minimise(problem, point)
         if best is None:
             raise IdentificationError(*_FAILED)
         found, point = best, best.point
@@ -90,25 +87,13 @@ def extend(
     problem: Problem, point: ParameterVector, fixed: Sequence[FixedNumber]
 ) -> tuple[Problem, ParameterVector]:
     """Return the problem and its point with the coordinates of the fixed numbers behind."""
-    size, count = len(point.names), len(fixed)
-    prior = problem.prior
-    for _ in fixed:
-        prior = prior.append(0.0, 1.0)
     terms = [
         replace(one, plant=replace(one.plant, fixed=(*one.plant.fixed, *fixed)))
         for one in problem.terms
     ]
-    reach = np.full(count, RELEASE.reach)
-    wider = replace(
-        problem,
-        terms=tuple(terms),
-        prior=prior,
-        lower=np.append(problem.lower, -reach),
-        upper=np.append(problem.upper, reach),
-        reach=np.append(np.broadcast_to(problem.reach, size), reach),
-    )
+    wider = problem.extend(terms, [PriorValue(0.0, 1.0)] * len(fixed), RELEASE.reach)
     names = (*point.names, *(one.coordinate for one in fixed))
-    return wider, ParameterVector(names, np.append(point.values, np.zeros(count)))
+    return wider, ParameterVector(names, np.append(point.values, np.zeros(len(fixed))))
 
 
 def _select(

@@ -20,6 +20,7 @@ from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
 )
 from drivetwin.estimation.likelihood.diagnostics.shaft_orders import find_order
 from drivetwin.estimation.likelihood.fit import compute_covariance
+from drivetwin.estimation.likelihood.optimize.search import RefinedStart
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95, Estimate, EstimatesMixin, SignalFit, Verdict
@@ -39,7 +40,7 @@ from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.omissions import ShownOmission
 from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.profile import trace_slow, widen
-from drivetwin.fit.search import FoundMinimum, RefinedStart
+from drivetwin.fit.search import FoundMinimum
 from drivetwin.fit.unknown import PlacedNumber, SoughtNumber
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.vehicle.spec import PriorValue

@@ -26,8 +26,8 @@ from drivetwin.tcu.problem import (
 )
 from drivetwin.tcu.unknowns import Own
 
-_LOOSE = GaussNewtonSettings(rough_max_iter=10, rough_rtol=1e-2, bend_ratio=0.75)
-_TIGHT = GaussNewtonSettings(ftol=0.1, kink_ftol=1.0, max_iter=8, bend_ratio=0.75)
+_LOOSE = GaussNewtonSettings(rough_max_iter=10, rough_rtol=1e-2)
+_TIGHT = GaussNewtonSettings(ftol=0.1, kink_ftol=1.0, max_iter=8)
 """Search near the minimum: a decrease of Q by 0.1 is a third of a standard deviation."""
 _ROUNDS = 2
 """Minima between which the weights are estimated anew [count]."""

@@ -62,4 +62,4 @@ def problem(made: Bench, off: float = 0.0) -> tuple[Any, Any]:
 def fitted(seed: int = 0) -> Any:
     made = bench(seed)
     posed, start = problem(made)
-    return fit_multistart(posed, start, [made.signals.shift])
+    return fit_multistart(posed, start)

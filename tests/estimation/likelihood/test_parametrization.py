@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.selection.plants import build_plant_priors, extend_problem
+from drivetwin.estimation.likelihood.motion import simulate_motion
+from drivetwin.estimation.likelihood.selection.plants import (
+    build_plant_priors,
+    drop_effect,
+    extend_problem,
+)
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
@@ -57,7 +60,9 @@ def _difference(term: Any, point: Any, index: int, step: float) -> FloatArray:
     """Compute the central difference (n,) of the simulated samples by one unknown."""
     change = np.zeros_like(point.values)
     change[index] = step
-    runs = [term.simulate(point.replace_values(point.values + one)) for one in (change, -change)]
+    runs = [
+        simulate_motion(term, point.replace_values(point.values + one)) for one in (change, -change)
+    ]
     ahead, behind = (term.record.sample_run(one) for one in runs)
     return np.asarray((ahead - behind) / (2.0 * step))
 
@@ -103,11 +108,15 @@ def test_an_idle_drum_turns_with_the_shift() -> None:
 def test_a_rigid_part_leaves_the_dual_clutch(effect: EffectId) -> None:
     posed, start = problem(bench())
     extended, point = _extend(effect, RIGID[effect])
-    plain, found = posed.terms[0].simulate(start), extended.terms[0].simulate(point)
+    plain, found = (
+        simulate_motion(one.terms[0], at) for one, at in ((posed, start), (extended, point))
+    )
+    assert plain
+    assert found
     largest = np.max(np.abs(plain.shaft_torque))
     assert found.shaft_torque == pytest.approx(plain.shaft_torque, abs=2e-4 * largest)
     assert found.engine_speed == pytest.approx(plain.engine_speed, rel=1e-4)
-    assert extended.drop_plant_effect().cost(start) == posed.cost(start)
+    assert drop_effect(extended).cost(start) == posed.cost(start)
 
 
 @cache
@@ -116,35 +125,6 @@ def _pose_once() -> tuple[Any, Any]:
 
 
 LAW = ("mu_c", "mu_drop", "mu_v", "ln_v_s")
-SLIPS = np.array([2.0, 25.0, 80.0])
-"""Slips [rad/s] at which a step keeps its change of μ: those of the steps of the law."""
-
-
-def _evaluate(law: FloatArray) -> FloatArray:
-    return np.asarray(law[0] + law[1] * np.exp(-SLIPS / np.exp(law[3])) + law[2] * SLIPS)
-
-
-@given(
-    st.lists(st.floats(-0.02, 0.02), min_size=3, max_size=3),
-    st.floats(-np.log(12.0), np.log(5.0)),
-)
-def test_a_step_changes_the_values_of_the_law_as_its_slopes_do(
-    mu: list[float], by_scale: float
-) -> None:
-    """Three of its coefficients follow the change of the Stribeck speed."""
-    posed, point = _pose_once()
-    places = [point.names.index(f"B3.{key}") for key in LAW]
-    values, step = point.values.copy(), np.zeros_like(point.values)
-    values[places] = [0.11, 0.02, 1e-4, np.log(12.0)]
-    step[places] = [mu[0], mu[1], 1e-2 * mu[2], by_scale]
-    before, moved = values[places], step[places]
-    fall = np.exp(-SLIPS / 12.0)
-    slopes = np.column_stack([np.ones(3), fall, SLIPS, 0.02 * fall * SLIPS / 12.0])
-    found = posed.retract(point.replace_values(values), step)
-    assert _evaluate(found[places]) == pytest.approx(_evaluate(before) + slopes @ moved, abs=1e-9)
-    assert found[places[3]] == before[3] + by_scale
-    others = np.setdiff1d(np.arange(values.size), places)
-    assert np.array_equal(found[others], values[others])
 
 
 def test_the_law_of_the_offgoing_element_is_a_level_of_its_partners() -> None:

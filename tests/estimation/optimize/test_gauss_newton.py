@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.optimize.gauss_newton import GAUSS_NEWTON, minimise
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
@@ -31,7 +31,7 @@ def test_correlated_unknowns_at_their_bounds(
 ) -> None:
     precision = np.full((3, 3), correlation) + (1.0 - correlation) * np.eye(3)
     upper = np.full(3, room)
-    problem = ShiftObjective((), Prior(np.array(mean), 1e4 * precision), -upper, upper)
+    problem = DualClutchProblem((), Prior(np.array(mean), 1e4 * precision), -upper, upper)
     found = minimise(problem, ParameterVector(NAMES, np.zeros(3)))
     assert found is not None
     assert found.converged
@@ -42,7 +42,7 @@ def test_correlated_unknowns_at_their_bounds(
 
 
 @dataclass(frozen=True, eq=False)
-class Kinked(ShiftObjective):
+class Kinked(DualClutchProblem):
     """Q = h·((x² + y² + z²)/2 + |x + 2y - 1| + |y - z - 1|), with the slopes of the side it is on:
     h is its `height`."""
 
@@ -88,7 +88,7 @@ def test_a_search_goes_along_kinks_to_their_crossing(start: list[float], height:
 
 
 @dataclass(frozen=True, eq=False)
-class LedOn(ShiftObjective):
+class LedOn(DualClutchProblem):
     """Q = 25·(a - weighted_at - 1)²: reweighted at every point it leads on for ever. log|Σ| is
     least where it was weighted at 2."""
 
@@ -113,12 +113,12 @@ class LedOn(ShiftObjective):
 def test_a_weighting_that_leads_away_stays_as_it_was_where_that_was_likeliest() -> None:
     free = np.full(1, np.inf)
 
-    def reweight_at(_: ShiftObjective, point: ParameterVector) -> ShiftObjective:
+    def reweight_at(_: DualClutchProblem, point: ParameterVector) -> DualClutchProblem:
         return LedOn((), Prior(np.zeros(1), np.zeros((1, 1))), -free, free, weighted_at=point["a"])
 
     start = ParameterVector(("a",), np.zeros(1))
     found = minimise(
-        reweight_at(ShiftObjective((), Prior.from_independent(1, {}), -free, free), start),
+        reweight_at(DualClutchProblem((), Prior.from_independent(1, {}), -free, free), start),
         start,
         reweight_at,
     )

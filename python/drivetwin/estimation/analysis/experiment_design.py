@@ -27,14 +27,15 @@ from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.data.output import Output
 from drivetwin.estimation.likelihood.data.recorded_data import RECORD
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, ShiftRecord
+from drivetwin.estimation.likelihood.data.torque_record import TORQUE, TorqueRecord
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
 from drivetwin.estimation.likelihood.fit import (
     LikelihoodFit,
     compute_variance_inflation,
     invert_information,
 )
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
+from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_parameters,
     differentiate,
@@ -68,12 +69,12 @@ COAST = (6.0, -0.1)
 class BaseShift:
     """Shift that an experiment starts from: its part of the fit at the minimum, its lock-up [s]."""
 
-    term: ShiftTerm
+    term: DualClutchTerm
     point: ParameterVector
     lockup: float
 
     @property
-    def record(self) -> ShiftRecord:
+    def record(self) -> TorqueRecord:
         """Recorded data of the shift."""
         return self.term.record
 
@@ -88,7 +89,7 @@ class ExperimentPlan:
     """An experiment as a term of a fit, with a start of its own at `point`."""
 
     experiment: Experiment
-    term: ShiftTerm
+    term: DualClutchTerm
     point: ParameterVector
 
 
@@ -102,14 +103,14 @@ def plan_experiment(experiment: Experiment, base: BaseShift) -> ExperimentPlan:
     extended = ParameterVector((*point.names, *renamed), values)
     structure = replace(term.plant, label=label)
     record = _RECORDS[experiment](base)
-    return ExperimentPlan(experiment, ShiftTerm.from_sensor_noise(structure, record), extended)
+    return ExperimentPlan(experiment, RecordedTerm.from_sensor_noise(structure, record), extended)
 
 
-def _repeat_shift(base: BaseShift) -> ShiftRecord:
+def _repeat_shift(base: BaseShift) -> TorqueRecord:
     return base.record
 
 
-def _build_throttle_steps(base: BaseShift) -> ShiftRecord:
+def _build_throttle_steps(base: BaseShift) -> TorqueRecord:
     largest = base.largest / max(STEPS)
     ends = DWELL * np.arange(len(STEPS) + 1)
     time = np.sort(np.concatenate([ends[:-1], ends[1:] - 0.06]))
@@ -118,7 +119,7 @@ def _build_throttle_steps(base: BaseShift) -> ShiftRecord:
     )
 
 
-def _build_coast_down(base: BaseShift) -> ShiftRecord:
+def _build_coast_down(base: BaseShift) -> TorqueRecord:
     length, share = COAST
     time = np.array([0.0, 0.1, 0.3, length])
     first = float(np.interp(base.record.time[0], *_get_samples(base.record.engine_torque)))
@@ -126,28 +127,28 @@ def _build_coast_down(base: BaseShift) -> ShiftRecord:
     return _build_gear_record(base, Signal(time, np.array([first, first, closed, closed])), length)
 
 
-def _build_torque_level(base: BaseShift) -> ShiftRecord:
+def _build_torque_level(base: BaseShift) -> TorqueRecord:
     elements = base.term.plant.elements
     scaled = _scale_pressures(base, {one.name: TORQUE_LEVEL for one in elements})
     return _replace_torque(scaled, lambda _, values: TORQUE_LEVEL * values)
 
 
-def _build_firmer_shift(base: BaseShift) -> ShiftRecord:
+def _build_firmer_shift(base: BaseShift) -> TorqueRecord:
     return _scale_pressures(base, {base.term.plant.driveline.oncoming.name: FIRMER})
 
 
-def _build_softer_shift(base: BaseShift) -> ShiftRecord:
+def _build_softer_shift(base: BaseShift) -> TorqueRecord:
     return _scale_pressures(base, {base.term.plant.driveline.oncoming.name: SOFTER})
 
 
-def _build_still_pedal(base: BaseShift) -> ShiftRecord:
+def _build_still_pedal(base: BaseShift) -> TorqueRecord:
     def held(time: FloatArray, values: FloatArray) -> FloatArray:
         return np.where(time > base.lockup, np.interp(base.lockup, time, values), values)
 
     return _replace_torque(base.record, held)
 
 
-_RECORDS: Mapping[Experiment, Callable[[BaseShift], ShiftRecord]] = {
+_RECORDS: Mapping[Experiment, Callable[[BaseShift], TorqueRecord]] = {
     Experiment.AGAIN: _repeat_shift,
     Experiment.THROTTLE_STEPS: _build_throttle_steps,
     Experiment.TORQUE_LEVEL: _build_torque_level,
@@ -162,7 +163,7 @@ def _get_samples(signal: Signal) -> tuple[FloatArray, FloatArray]:
     return signal.time, signal.values
 
 
-def _scale_pressures(base: BaseShift, factors: Mapping[str, float]) -> ShiftRecord:
+def _scale_pressures(base: BaseShift, factors: Mapping[str, float]) -> TorqueRecord:
     """Multiply the pressures above P0 of some elements."""
     pressures = dict(base.record.pressures)
     for name, factor in factors.items():
@@ -174,8 +175,8 @@ def _scale_pressures(base: BaseShift, factors: Mapping[str, float]) -> ShiftReco
 
 
 def _replace_torque(
-    record: ShiftRecord, change: Callable[[FloatArray, FloatArray], FloatArray]
-) -> ShiftRecord:
+    record: TorqueRecord, change: Callable[[FloatArray, FloatArray], FloatArray]
+) -> TorqueRecord:
     """Change the engine torque by a function of time [s] and torque [N m]."""
     torque, steady = (
         Signal(signal.time, change(signal.time, signal.values))
@@ -184,7 +185,7 @@ def _replace_torque(
     return replace(record, inputs={**record.inputs, TORQUE: torque}, steady_torque=steady)
 
 
-def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> ShiftRecord:
+def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> TorqueRecord:
     """Build a record of the off-going element's gear alone, with the rates and noise of the log."""
     record, driveline = base.record, base.term.plant.driveline
     step = float(np.median(np.diff(record.time)))
@@ -202,7 +203,7 @@ def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> ShiftR
     }
     inputs = {TORQUE: torque, **pressures}
     nothing = {name: np.zeros(one.time.size) for name, one in inputs.items()}
-    return ShiftRecord(
+    return TorqueRecord(
         time,
         tuple(_make_empty_output(out, record.time, time) for out in record.outputs),
         inputs,

@@ -21,14 +21,19 @@ from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import ShiftElementKinematics, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord, build_record
+from drivetwin.estimation.likelihood.data.torque_record import TorqueRecord, build_record
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.optimize.multistart import fit_local
-from drivetwin.estimation.likelihood.parametrization import LAW, ShiftModel
+from drivetwin.estimation.likelihood.parametrization import (
+    LAW,
+    DualClutchPlant,
+    DualClutchProblem,
+    DualClutchTerm,
+)
 from drivetwin.estimation.likelihood.priors import split_spans
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
+from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
@@ -57,7 +62,7 @@ class KnotTable:
 
 
 @dataclass(frozen=True, eq=False)
-class TableShiftModel(ShiftModel):
+class TablePlant(DualClutchPlant):
     """A structure whose `tables` take the place of laws, by element."""
 
     tables: Mapping[str, KnotTable] = field(default_factory=dict)
@@ -140,7 +145,7 @@ def _build_problem(
     base: LikelihoodFit,
     signals: Sequence[ShiftSignals],
     tables: Mapping[str, KnotTable],
-) -> tuple[ShiftObjective, ParameterVector]:
+) -> tuple[DualClutchProblem, ParameterVector]:
     """Build the problem with knots in place of laws, and its initial point."""
     laws = {f"{name}.{key}" for name in tables for key in LAW}
     kept = [k for k, name in enumerate(base.point.names) if name not in laws]
@@ -164,7 +169,7 @@ def _build_problem(
     mean, precision = np.zeros(size), np.zeros((size, size))
     mean[: len(kept)] = base.problem.prior.mean[kept]
     precision[: len(kept), : len(kept)] = base.problem.prior.precision[np.ix_(kept, kept)]
-    return ShiftObjective(terms, Prior(mean, precision), lower, upper), point
+    return DualClutchProblem(terms, Prior(mean, precision), lower, upper), point
 
 
 def _get_law(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
@@ -179,18 +184,18 @@ def _get_law(base: LikelihoodFit, name: str) -> Stribeck | FrictionTable:
 
 
 def _replace_laws(
-    term: ShiftTerm, base: LikelihoodFit, tables: Mapping[str, KnotTable]
-) -> ShiftTerm:
+    term: DualClutchTerm, base: LikelihoodFit, tables: Mapping[str, KnotTable]
+) -> DualClutchTerm:
     """Replace the laws of a term by tables."""
     old = term.plant
     laws = {f"{e.name}.{key}" for e in old.elements for key in LAW}
     fixed = {**old.fixed, **{name: old.get_value(base.point, name) for name in laws}}
     mine = {one.name: tables[one.name] for one in old.elements if one.name in tables}
-    structure = TableShiftModel(**{**vars(old), "fixed": fixed, "tables": mine})
-    return ShiftTerm.from_sensor_noise(structure, term.record)
+    structure = TablePlant(**{**vars(old), "fixed": fixed, "tables": mine})
+    return RecordedTerm.from_sensor_noise(structure, term.record)
 
 
-def _restore_inputs(term: ShiftTerm, signals: ShiftSignals, span: Span) -> ShiftRecord:
+def _restore_inputs(term: DualClutchTerm, signals: ShiftSignals, span: Span) -> TorqueRecord:
     """Restore the inputs as measured: those of a fit are the expected ones."""
     return build_record(signals, span, term.record.fills).select_modes(term.record.modes)
 

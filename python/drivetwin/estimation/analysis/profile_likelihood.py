@@ -24,7 +24,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.budget import REMEDY
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_variance_inflation
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
@@ -173,7 +173,7 @@ class _FixedParameter:
     parameter: str
 
     @property
-    def problem(self) -> ShiftObjective:
+    def problem(self) -> DualClutchProblem:
         """Objective with the weighting at the minimum."""
         return self.fit.problem
 

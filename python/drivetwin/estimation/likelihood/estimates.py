@@ -18,6 +18,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.direct.load_balance import AERO, report_different_loads
+from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.diagnostics.identifiability import (
     find_at_bounds,
     find_null_directions,
@@ -40,9 +41,10 @@ from drivetwin.estimation.likelihood.effects.causes import (
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.motion import simulate_motion
 from drivetwin.estimation.likelihood.noise.residual_covariance import NoisePath
+from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
 from drivetwin.estimation.likelihood.selection.candidates import check_other_law, collect_loads
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_laws,
     compute_parameters,
@@ -105,7 +107,7 @@ def predict_spread(
         corrected.residuals,
         strict=True,
     ):
-        run = term.simulate(corrected.mean)
+        run = simulate_motion(term, corrected.mean)
         if run is None:
             found.append({})
             continue
@@ -136,7 +138,7 @@ def _propagate_inputs(path: NoisePath) -> FloatArray:
     return np.asarray(np.einsum("ni,nij,nj->n", rows, state[centre], rows))
 
 
-def _split(term: ShiftTerm, mean: FloatArray, std: FloatArray) -> dict[str, PredictedSpread]:
+def _split(term: DualClutchTerm, mean: FloatArray, std: FloatArray) -> dict[str, PredictedSpread]:
     """Split stacked means and standard deviations (n,) by signal."""
     found, first = {}, 0
     for out in term.record.outputs:
@@ -352,7 +354,7 @@ def _build_load_law(fit: LikelihoodFit, corrected: Correction) -> LoadLaw | None
     k, term = fit.point.names.index(AERO), fit.problem.terms[0]
     std = float(np.sqrt(corrected.covariance[k, k]))
     mean_speed = term.plant.mean_speed
-    return LoadLaw(corrected.mean[AERO], std, mean_speed, over_eta=not term.scale_known)
+    return LoadLaw(corrected.mean[AERO], std, mean_speed, over_eta=not term.compares(OUTPUT_TORQUE))
 
 
 def _compute_std(matrix: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import limit_evaluations
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.vehicle.effects import EffectId
 
@@ -42,7 +42,7 @@ class LikelihoodFit:
     element beside the dual clutch; its unknowns come last, that of the size first.
     """
 
-    problem: ShiftObjective
+    problem: DualClutchProblem
     point: ParameterVector
     mean: ParameterVector
     covariance: FloatArray

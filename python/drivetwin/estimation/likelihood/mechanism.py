@@ -21,7 +21,7 @@ class Mechanism(StrEnum):
     FAR_MODES = "far_modes"
     LOAD_TERMS = "load_terms"
     MODE_AVERAGE = "mode_average"
-    LOWER_GEAR = "lower_gear"
+    BACKLASH_FIRST = "backlash_first"
     ADMISSION = "admission"
     PLANTS = "plants"
 

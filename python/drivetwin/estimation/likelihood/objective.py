@@ -16,7 +16,7 @@ errors_in_variables.py).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, Self, TypeVar
 
@@ -34,6 +34,7 @@ from drivetwin.estimation.optimize.objective import (
 )
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.vehicle.spec import PriorValue
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,25 @@ class LikelihoodObjective(Generic[T]):
     lower: FloatArray
     upper: FloatArray
     reach: FloatArray | float = np.inf
+
+    def extend(
+        self, terms: Sequence[T], priors: Sequence[PriorValue], reach: float
+    ) -> LikelihoodObjective[T]:
+        """Add unknowns with `priors`, which come last, and of which the `terms` are functions.
+
+        They stay within `reach` standard deviations of their prior, as each step does.
+        """
+        prior = self.prior
+        for one in priors:
+            prior = prior.append(one.value, one.std)
+        mean, std = np.array([(one.value, one.std) for one in priors]).T
+        return LikelihoodObjective(
+            tuple(terms),
+            prior,
+            np.append(self.lower, mean - reach * std),
+            np.append(self.upper, mean + reach * std),
+            np.append(np.broadcast_to(self.reach, self.lower.shape), reach * std),
+        )
 
     @property
     def size(self) -> int:

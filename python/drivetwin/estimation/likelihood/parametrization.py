@@ -27,9 +27,10 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
-from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.direct.load_balance import AERO
-from drivetwin.estimation.likelihood.term import RecordedPlant
+from drivetwin.estimation.likelihood.data.torque_record import TorqueRecord
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.term import Disturbance, RecordedPlant, RecordedTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.simulation.added_elements import (
@@ -166,8 +167,6 @@ START = ("speed", "wheel_speed", "twist")
 LOAD_DEVIATION = "load"
 """Unknown of each shift but the first of a log on a hilly road: d, its load at the output shaft
 less the mean over the shifts of the log [N m]."""
-RETRACTION_SLIPS = np.array([2.0, 25.0, 80.0])
-"""Slips [rad/s] at which a law takes its step: near lock-up, in the middle, at the start."""
 RUN_SPECIFIC = (*START, LOAD_DEVIATION)
 """All unknowns that belong to the run of one shift, by what follows its label and the dot."""
 
@@ -189,7 +188,7 @@ class Tie:
 
 
 @dataclass(frozen=True)
-class ShiftModel(RecordedPlant):
+class DualClutchPlant(RecordedPlant[TorqueRecord]):
     """Fixed description of one shift: its elements and every value that is not estimated.
 
     `fixed` gives a value to every name that a Point of the fit does not have. `label` marks the
@@ -361,6 +360,25 @@ class ShiftModel(RecordedPlant):
         torque = -float(self.get_value(point, "te_delay"))
         return dict.fromkeys(inputs, 0.0) | {ENGINE_TORQUE: torque}
 
+    def list_disturbances(
+        self, point: ParameterVector, record: TorqueRecord
+    ) -> dict[str, Disturbance]:
+        """List delay and mean error of the engine torque, as far as they are unknowns.
+
+        The rate is that of the torque without noise: jitter would seem to show a delay.
+        """
+        found = {}
+        delay, offset = self.get_unknown("te_delay"), self.get_unknown(TE_OFFSET)
+        if delay in point.names:
+            found[delay] = Disturbance(ENGINE_TORQUE, record.compute_torque_rate(point[delay]))
+        if offset in point.names:
+            found[offset] = Disturbance(ENGINE_TORQUE, np.full(record.time.size - 1, -1.0))
+        return found
+
+    def describe_input(self, name: str) -> str:
+        """Return the name of a measured input in findings."""
+        return name if name == ENGINE_TORQUE else f"pressure of {name}"
+
     def build_start(self, point: ParameterVector) -> State:
         """Build the initial state of the run at `point`: the off-going element is locked."""
         speed, wheel, twist = (point[f"{self.label}.{key}"] for key in START)
@@ -368,31 +386,12 @@ class ShiftModel(RecordedPlant):
         return State(ratio * speed, speed, wheel, twist, (self.driveline.offgoing.name,))
 
 
-def retract(point: ParameterVector, step: FloatArray) -> FloatArray:
-    """Compute the values (p,) after a `step` (p,), straight in the friction laws' own values.
-
-    The four coefficients of a Stribeck law nearly compensate each other if v_s is as large as the
-    slips that occur. The valley of Q is then curved in the coefficients, and straight in the
-    values of the law at three slips with ln v_s as the fourth coordinate. A step to a v_s at which
-    the law does not change over these slips stays straight in the coefficients.
-    """
-    values = point.values + step
-    for name in point.names:
-        element, _, key = name.rpartition(".")
-        if key != LAW[-1]:
-            continue
-        index = [point.names.index(f"{element}.{coefficient}") for coefficient in LAW]
-        mu, slopes = evaluate_stribeck(point.values[index], RETRACTION_SLIPS)
-        target = mu + slopes.T @ step[index]
-        _, linear = evaluate_stribeck(values[index], RETRACTION_SLIPS)
-        matrix = linear[:-1].T
-        if np.all(np.isfinite(matrix)) and np.linalg.matrix_rank(matrix) == matrix.shape[0]:
-            values[index[:-1]] = np.linalg.solve(matrix, target)
-    return values
-
-
 def build_load_deviations(loads: Sequence[float]) -> dict[str, float]:
     """Build start values of T_v/i_f and of the load deviations of the shifts of a log [N m]."""
     mean = float(np.mean(loads))
     own = {f"start{k}.{LOAD_DEVIATION}": load - mean for k, load in enumerate(loads)}
     return {"Tv_over_if": mean, **own}
+
+
+DualClutchTerm = RecordedTerm[DualClutchPlant, TorqueRecord]
+DualClutchProblem = LikelihoodObjective[DualClutchTerm]

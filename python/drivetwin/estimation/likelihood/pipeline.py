@@ -18,13 +18,12 @@ from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.candidates import try_plants
-from drivetwin.estimation.likelihood.selection.lower_gear_search import (
-    fit_from_lower_gear,
-    fit_with_backlash,
-)
 from drivetwin.estimation.likelihood.selection.plants import build_plant_priors
-from drivetwin.estimation.likelihood.selection.sampling_mode import report_modes
-from drivetwin.estimation.likelihood.selection.select_model import select_model
+from drivetwin.estimation.likelihood.selection.sampling_mode import get_modes, report_modes
+from drivetwin.estimation.likelihood.selection.select_model import (
+    fit_with_backlash,
+    select_model,
+)
 from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.findings import Finding
 from drivetwin.simulation.dual_clutch import LossLaw
@@ -75,13 +74,13 @@ def _fit(
             best, notes = select_model(signals, drivelines, loss_law, guess, priors)
         except IdentificationError:
             found = (
-                _search_again(signals, drivelines, loss_law, guess, priors)
-                if is_enabled(Mechanism.LOWER_GEAR)
+                _search_with_backlash(signals, drivelines, loss_law, guess, priors)
+                if is_enabled(Mechanism.BACKLASH_FIRST)
                 else None
             )
             if found is None:
                 raise
-            best, notes = found, tuple(report_modes(found.problem.modes))
+            best, notes = found, tuple(report_modes(get_modes(found.problem)))
     with _STAGES.enter("plant", "elements of the plant"):
         admits = is_enabled(Mechanism.ADMISSION)
         admitted, warnings = admit_excluded(best, priors) if admits else (priors, ())
@@ -90,21 +89,20 @@ def _fit(
         return _SelectedFit(best, admitted, (*notes, *warnings))
 
 
-def _search_again(
+def _search_with_backlash(
     signals: Sequence[ShiftSignals],
     drivelines: Sequence[KnownDriveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
     priors: EffectPriors,
 ) -> LikelihoodFit | None:
-    """Fit with a constant load from the lower gear, with backlash where that fails; None where no
-    plant reaches a minimum."""
+    """Fit with a constant load and backlash in the plant; None without a minimum, and where the
+    card excludes backlash."""
+    stated = priors.get_prior(EffectId.BACKLASH, drivelines[0])
+    if not (stated.std or stated.value):
+        return None
     constant = {name: value for name, value in guess.items() if name != AERO}
     problem, start = build_problem(signals, drivelines, loss_law, constant, hilly=len(signals) > 1)
-    shifts = [s.shift for s in signals]
-    found = fit_from_lower_gear(problem, start, shifts)
-    stated = priors.get_prior(EffectId.BACKLASH, drivelines[0])
-    if found is not None or not (stated.std or stated.value):
-        return found
-    own = build_plant_priors(EffectId.BACKLASH, priors, drivelines[0])
-    return fit_with_backlash(problem, start, shifts, own)
+    return fit_with_backlash(
+        problem, start, build_plant_priors(EffectId.BACKLASH, priors, drivelines[0])
+    )

@@ -34,18 +34,19 @@ from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute
 from drivetwin.estimation.direct.momentum_balance import DELAY
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.recorded_data import RECORD
-from drivetwin.estimation.likelihood.data.shift_record import build_record
+from drivetwin.estimation.likelihood.data.torque_record import build_record
 from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,
     LOAD_DEVIATION,
     START,
     TE_OFFSET,
-    ShiftModel,
+    DualClutchPlant,
+    DualClutchProblem,
     Tie,
     map_log_names,
 )
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
+from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
@@ -126,7 +127,7 @@ def build_problem(
     loss_law: LossLaw,
     guess: Mapping[str, float],
     hilly: bool = False,
-) -> tuple[ShiftObjective, ParameterVector]:
+) -> tuple[DualClutchProblem, ParameterVector]:
     """Build the fit of all shifts of one or several logs, and its initial point.
 
     `guess` gives a value to every unknown of the driveline and to the laws of all elements; the
@@ -166,7 +167,7 @@ def build_problem(
         same = [one for one in signals if one.log == s.log]
         own = {name: fixed[n] for name, n in map_log_names(s.log).items() if n in fixed}
         own_load = load_factors.get(k, {})
-        structure = ShiftModel(
+        structure = DualClutchPlant(
             d,
             loss_law,
             label,
@@ -177,7 +178,7 @@ def build_problem(
             own_load,
             partners=partners,
         )
-        terms.append(ShiftTerm.from_sensor_noise(structure, record))
+        terms.append(RecordedTerm.from_sensor_noise(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
         wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
         torque = first.get("output_torque", guess["Tv_over_if"])
@@ -193,7 +194,7 @@ def build_problem(
     prior = Prior.from_independent(len(point.names), entries)
     sums = list_sum_priors(inertias, drivelines[0].J1, guess["eta"])
     prior = add_sum_priors(prior, point, fixed, sums)
-    return ShiftObjective(tuple(terms), prior, lower, upper), point
+    return DualClutchProblem(tuple(terms), prior, lower, upper), point
 
 
 def _expand_logs(names: Sequence[str], logs: Sequence[int]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -32,8 +32,17 @@ from drivetwin.simulation.network import NetworkRun, build_element
 from drivetwin.simulation.network_response import compute_response
 from drivetwin.simulation.network_sensitivity import NetworkTask
 
+R = TypeVar("R", bound=RecordedData)
 
-class RecordedPlant:
+
+class Disturbance(NamedTuple):
+    """Change (N-1,) of an `input` over each step of the grid per unit of a coordinate."""
+
+    input: str
+    change: FloatArray
+
+
+class RecordedPlant(Generic[R]):
     """Network of a recording as a function of the unknowns.
 
     `label` is the name of the recording among several, `outputs` are those of the network by the
@@ -71,13 +80,21 @@ class RecordedPlant:
         """List the coordinates that act on numbers by which the core has no derivatives."""
         return []
 
+    def list_disturbances(self, point: ParameterVector, record: R) -> dict[str, Disturbance]:
+        """List the coordinates at `point` that act as a disturbance of an input, by name."""
+        del point, record
+        return {}
+
+    def describe_input(self, name: str) -> str:
+        """Return the name of a measured input in findings."""
+        return name
+
     def get_step(self, name: str) -> float:
         """Return the step of a coordinate for a difference of runs."""
         raise NotImplementedError(name)
 
 
-P = TypeVar("P", bound=RecordedPlant)
-R = TypeVar("R", bound=RecordedData)
+P = TypeVar("P", bound=RecordedPlant[Any])
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +130,22 @@ class RecordedTerm(Generic[P, R]):
     @property
     def inputs(self) -> Mapping[str, Signal]:
         """Measured inputs by the names of findings."""
-        return self.record.inputs
+        return {self.plant.describe_input(name): one for name, one in self.record.inputs.items()}
+
+    def compares(self, name: str) -> bool:
+        """Return whether an output is compared."""
+        return any(out.name == name for out in self.record.outputs)
+
+    def add_to_inputs(self, point: ParameterVector, changes: Mapping[str, Signal]) -> Self:
+        """Return the term driven by inputs with `changes` by name, at the instants at which they
+        act at `point`."""
+        inputs = dict(self.record.inputs)
+        delays = self.plant.get_delays(point, inputs)
+        for name, change in changes.items():
+            old = inputs[name]
+            more = np.interp(old.time + delays[name], change.time, change.values)
+            inputs[name] = replace(old, values=old.values + more)
+        return replace(self, record=replace(self.record, inputs=inputs))
 
     def build_task(self, point: ParameterVector) -> NetworkTask:
         """Build the run at `point`, driven by the inputs of the record."""
@@ -174,6 +206,10 @@ class RecordedTerm(Generic[P, R]):
             if column is None:
                 return None
             slopes[:, point.names.index(name)] = column
+        disturbances = self.plant.list_disturbances(point, self.record)
+        response = self.compute_response(point) if disturbances else None
+        for name, one in disturbances.items():
+            slopes[:, point.names.index(name)] = self.observe(response, {one.input: one.change})
         return (residual, slopes) if np.all(np.isfinite(slopes)) else None
 
     def _compute_slope(

@@ -25,10 +25,17 @@ from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftData
 from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
 from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
-from drivetwin.estimation.likelihood.optimize.multistart import STAGED_START
-from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, START, map_log_names
+from drivetwin.estimation.likelihood.parametrization import (
+    LAW,
+    LOG_SPECIFIC,
+    START,
+    DualClutchProblem,
+    DualClutchTerm,
+    map_log_names,
+)
 from drivetwin.estimation.likelihood.priors import build_problem
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, ShiftTerm
+from drivetwin.estimation.likelihood.selection.sampling_mode import get_modes, select_modes
+from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
@@ -41,6 +48,8 @@ from drivetwin.simulation.dual_clutch import State
 class PredictionSettings:
     """Settings of the prediction bounds."""
 
+    clearance: float = 0.02
+    """Distance from the phase boundary at which the gear before a shift ends [s]."""
     draws: int = 120
     """Draws of noise and parameters: the bound is the third largest [-]."""
     upper_quantile: float = 0.975
@@ -79,10 +88,10 @@ def predict_shifts(
     held, drivelines = [one.signals for one in shifts], [one.driveline for one in shifts]
     law = drivelines[0].loss_law
     problem, point = build_problem(held, drivelines, law, _collect_values(fit, drivelines))
-    problem = problem.select_modes(fit.problem.modes)
+    problem = select_modes(problem, get_modes(fit.problem))
     unseen = _find_new_unknowns(fit, problem, point)
     before = _fit_gear_before(
-        problem, point, unseen, [s.shift.before[1] - STAGED_START.clearance for s in held]
+        problem, point, unseen, [s.shift.before[1] - PREDICTION.clearance for s in held]
     )
     point, own = before.point, map_log_names(held[0].log)
     std = np.sqrt(np.diag(before.own))
@@ -107,7 +116,7 @@ def predict_shifts(
     )
 
 
-def _has_law(fit: LikelihoodFit, term: ShiftTerm) -> bool:
+def _has_law(fit: LikelihoodFit, term: DualClutchTerm) -> bool:
     """Return whether the fit identifies the friction of the on-coming element."""
     return f"{term.plant.driveline.oncoming.name}.{LAW[-1]}" in fit.point.names
 
@@ -135,7 +144,7 @@ def _collect_values(fit: LikelihoodFit, drivelines: Sequence[KnownDriveline]) ->
 
 
 def _find_new_unknowns(
-    fit: LikelihoodFit, problem: ShiftObjective, point: ParameterVector
+    fit: LikelihoodFit, problem: DualClutchProblem, point: ParameterVector
 ) -> list[int]:
     """Return the indices of the unknowns that belong to the log or the run and are not in the
     fit."""
@@ -157,7 +166,7 @@ class _GearFit:
 
 
 def _fit_gear_before(
-    problem: ShiftObjective, point: ParameterVector, unseen: list[int], ends: Sequence[float]
+    problem: DualClutchProblem, point: ParameterVector, unseen: list[int], ends: Sequence[float]
 ) -> _GearFit:
     """Fit the new unknowns to the stretches before the shifts, all others fixed."""
     known = [k for k in range(len(point.names)) if k not in unseen]
@@ -168,7 +177,11 @@ def _fit_gear_before(
     held = free
     for k in known:
         held = held.fix_parameter(k, float(point.values[k]))
-    cut = replace(problem.cut(ends), prior=held)
+    terms = tuple(
+        RecordedTerm.from_sensor_noise(one.plant, one.record.cut(end))
+        for one, end in zip(problem.terms, ends, strict=True)
+    )
+    cut = replace(problem, terms=terms, prior=held)
     found = minimise(cut, point, lambda _, at: cut.update_weighting(at))
     if found is None:
         raise IdentificationError(
@@ -181,7 +194,7 @@ def _fit_gear_before(
 
 
 def _compute_root(
-    fit: LikelihoodFit, problem: ShiftObjective, before: _GearFit, unseen: list[int]
+    fit: LikelihoodFit, problem: DualClutchProblem, before: _GearFit, unseen: list[int]
 ) -> FloatArray:
     """Compute a root (p, d) of the covariance of all unknowns of the held-out shifts."""
     names = before.point.names
@@ -207,7 +220,7 @@ def _compute_prior_variance(precision: float) -> float:
 
 
 def _compute_bounds(
-    term: ShiftTerm, point: ParameterVector, moved: FloatArray, rng: np.random.Generator
+    term: DualClutchTerm, point: ParameterVector, moved: FloatArray, rng: np.random.Generator
 ) -> dict[str, PredictionInterval]:
     """Compute the error of each output over draws; empty if the shift cannot be simulated."""
     term = term.update_weighting(point)

@@ -59,9 +59,10 @@ class GaussNewtonSettings:
     screening_iter: int = 8
     """Iterations after which a search with Q above its limit ends: searches that start far off and
     succeed have converged by then [-]."""
-    bend_ratio: float = 0.0
-    """Ratio of actual to predicted decrease below which a step is bent along the valley; 0 for
-    never [-]."""
+    bend_ratio: float = 0.75
+    """Ratio of actual to predicted decrease below which a step is bent along the valley, as those
+    of the coefficients of a friction law and of inertias on both sides of a shaft; 0 for never
+    [-]."""
     min_refreshes: int = 3
     """Smallest number of points at which the weighting is recomputed [-]."""
     patience: int = 3

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drivetwin.estimation.data.shift_data import TorqueOfSpeeds
+from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.fixtures import bench, fitted, problem
 from tests.support.arrays import FloatArray
@@ -19,7 +20,9 @@ TORQUE = "engine torque"
 
 def _short() -> tuple[Any, Any]:
     posed, start = problem(bench())
-    return posed.cut([posed.terms[0].record.time[0] + 0.15]).terms[0], start
+    term = posed.terms[0]
+    record = term.record.cut(term.record.time[0] + 0.15)
+    return RecordedTerm.from_sensor_noise(term.plant, record), start
 
 
 def test_weighting_equals_the_dense_covariance() -> None:
@@ -109,8 +112,8 @@ def _sparse(every: int) -> tuple[Any, Any]:
     """A shift up to lock-up of which outputs and pressures show one sample in so many."""
     made = bench()
     posed, start = problem(made)
-    term = posed.cut([made.signals.shift.lockup_time - 0.02]).terms[0]
-    record = term.record
+    term = posed.terms[0]
+    record = term.record.cut(made.signals.shift.lockup_time - 0.02)
     outputs = tuple(
         replace(out, place=out.place[::every], values=out.values[::every]) for out in record.outputs
     )
@@ -203,14 +206,16 @@ def test_expected_inputs_move_back_towards_the_truth() -> None:
 
 def test_what_is_held_back_acts_on_the_residual_as_on_a_run() -> None:
     posed, truth = problem(bench())
-    term = posed.cut([bench().signals.shift.lockup_time - 0.02]).terms[0]
+    term = posed.terms[0]
+    record = term.record.cut(bench().signals.shift.lockup_time - 0.02)
+    term = RecordedTerm.from_sensor_noise(term.plant, record)
     small = {name: 0.05 * values for name, values in term.record.held_back.items()}
     whole = {name: Signal(p.time, p.values + small[name]) for name, p in term.record.inputs.items()}
     smooth = replace(term, record=replace(term.record, held_back=small))
     read = replace(term, record=replace(term.record, inputs=whole))
-    before = smooth.evaluate(truth)
-    expected = (read.evaluate(truth) - before) / term.record.sigma
-    found = (smooth.update_weighting(truth).evaluate(truth) - before) / term.record.sigma
+    ways = (smooth, read, smooth.update_weighting(truth))
+    before, as_read, linear = (np.asarray(one.evaluate(truth)) for one in ways)
+    expected, found = ((one - before) / term.record.sigma for one in (as_read, linear))
     assert np.linalg.norm(found - expected) < 0.1 * np.linalg.norm(expected)
 
 

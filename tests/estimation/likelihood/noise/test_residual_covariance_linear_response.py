@@ -11,6 +11,7 @@ import pytest
 
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
+from drivetwin.estimation.likelihood.motion import simulate_motion
 from drivetwin.simulation.dual_clutch import Signal
 from tests.estimation.likelihood.fixtures import ROUGH, bench, problem
 from tests.support.bench import record_bench
@@ -20,7 +21,7 @@ from tests.support.bench import record_bench
 def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     posed, point = problem(bench(noise=0.0))
     term = posed.terms[0]
-    base = term.simulate(point)
+    base = simulate_motion(term, point)
     assert base is not None
     shift = bench(noise=0.0).signals.shift
     size, start = (0.5, 3.0) if name == "engine torque" else (50.0, shift.inertia_phase[0] + 0.05)
@@ -34,7 +35,7 @@ def test_disturbed_inputs_move_the_run_as_the_response_says(name: str) -> None:
     old = inputs[name]
     new = Signal(old.time, old.values + bump(old.time))
     record = replace(term.record, inputs={**inputs, name: new})
-    run = replace(term, record=record).simulate(point)
+    run = simulate_motion(replace(term, record=record), point)
     assert run is not None
     middle = 0.5 * (base.time[1:] + base.time[:-1])
     change = np.interp(middle, new.time, new.values - old.values)
@@ -58,7 +59,7 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: Any) ->
     made = record_bench(scenario, 0, ROUGH, 0.0)
     posed, point = problem(made)
     term, shift = posed.terms[0], made.signals.shift
-    base = term.simulate(point)
+    base = simulate_motion(term, point)
     assert base is not None
     old, age = term.record.engine_torque, term.plant.get_value(point, "te_delay")
     middle = 0.5 * (base.time[1:] + base.time[:-1])
@@ -73,7 +74,7 @@ def test_the_engine_torque_acts_by_the_loss_law(name: ScenarioName, law: Any) ->
         bump = 0.5 * ((old.time > start) & (old.time < start + length))
         torque = Signal(old.time, old.values + bump)
         moved = replace(term.record, inputs={**term.record.inputs, "engine torque": torque})
-        run = replace(term, record=moved).simulate(point)
+        run = simulate_motion(replace(term, record=moved), point)
         assert run is not None
         change = np.interp(middle + age, old.time, bump)
         expected = term.observe(term.compute_response(point), {"engine torque": change})
@@ -89,7 +90,7 @@ def test_no_slip_is_left_over_wherever_in_a_step_the_element_locks(level: float)
     values = point.values.copy()
     values[point.names.index("B3.mu_c")] *= level
     point, term = point.replace_values(values), posed.terms[0]
-    run = term.simulate(point)
+    run = simulate_motion(term, point)
     assert run is not None
     lock = next(event.time for event in run.events if event.kind == "lock")
     model = term.plant.build_model(point)

@@ -14,14 +14,14 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import get_pressure_element
 from drivetwin.estimation.data.shift_data import KnownDriveline
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE, get_columns
+from drivetwin.estimation.likelihood.data.torque_record import TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     OperatingPoint,
     evaluate_operating_point,
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.optimize.objective import (
     ParameterVector,
     place_columns,
@@ -219,7 +219,7 @@ class EffectColumns:
 
 
 def build_columns(
-    problem: ShiftObjective,
+    problem: DualClutchProblem,
     point: ParameterVector,
     priors: EffectPriors,
     again: Relinearization | None = None,
@@ -363,7 +363,7 @@ def _build_curved(
 
 
 def compute_inputs(
-    problem: ShiftObjective,
+    problem: DualClutchProblem,
     point: ParameterVector,
     priors: EffectPriors,
     first: EffectColumns,

@@ -31,7 +31,7 @@ from drivetwin.estimation.likelihood.fit import (
     compute_covariance,
     invert_information,
 )
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import Group
 
@@ -190,7 +190,7 @@ def keep_fit(fit: LikelihoodFit) -> Correction:
 class _Expansion:
     """Point, expansion of Q there, and the weighted sums of all columns."""
 
-    problem: ShiftObjective
+    problem: DualClutchProblem
     normal: NormalEquations
     point: ParameterVector
     sums: WeightedColumns
@@ -324,7 +324,7 @@ def _expand_again(
 
 
 def _expand_with_inputs(
-    problem: ShiftObjective, point: ParameterVector, priors: EffectPriors, amounts: _Amounts
+    problem: DualClutchProblem, point: ParameterVector, priors: EffectPriors, amounts: _Amounts
 ) -> _Expansion | None:
     """Expand Q at `point` with effects in the inputs; None if a run does not complete.
 

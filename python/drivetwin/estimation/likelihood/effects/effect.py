@@ -17,11 +17,11 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import ShiftRecord, get_columns
+from drivetwin.estimation.likelihood.data.torque_record import TorqueRecord, get_columns
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.estimation.likelihood.motion import Contact, evaluate_contact, simulate_motion
 from drivetwin.estimation.likelihood.noise.residual_covariance import LinearResponse
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
-from drivetwin.estimation.likelihood.slip_contact import Contact, evaluate_contact
+from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.added_elements import AddedElements
 from drivetwin.simulation.driveline import INPUT, OUTPUT, WHEEL
@@ -38,14 +38,14 @@ class OperatingPoint:
     """One shift simulated at a point of the unknowns, with its response to the inputs and to
     torques on `NODES`."""
 
-    term: ShiftTerm
+    term: DualClutchTerm
     point: ParameterVector
     model: DualClutch
     run: Trajectory
     response: LinearResponse
 
     @property
-    def record(self) -> ShiftRecord:
+    def record(self) -> TorqueRecord:
         """Measured data of the shift."""
         return self.term.record
 
@@ -123,9 +123,9 @@ def compute_middle(column: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (column[1:] + column[:-1]))
 
 
-def evaluate_operating_point(term: ShiftTerm, point: ParameterVector) -> OperatingPoint | None:
+def evaluate_operating_point(term: DualClutchTerm, point: ParameterVector) -> OperatingPoint | None:
     """Simulate a shift at `point` and linearise it; None if it has no complete, finite run."""
-    run, response = term.simulate(point), term.compute_response(point, NODES)
+    run, response = simulate_motion(term, point), term.compute_response(point, NODES)
     if run is None or response is None:
         return None
     return OperatingPoint(term, point, term.plant.build_model(point), run, response)

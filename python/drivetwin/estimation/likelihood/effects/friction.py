@@ -14,8 +14,8 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     SyntheticVehicle,
     compute_friction_work,
 )
+from drivetwin.estimation.likelihood.motion import Contact
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.likelihood.slip_contact import Contact
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.simulation.dual_clutch import FrictionTable
 from drivetwin.vehicle.effects import EffectId

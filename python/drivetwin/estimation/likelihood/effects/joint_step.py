@@ -22,9 +22,10 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
+from drivetwin.estimation.likelihood.column_products import compute_column_products
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective, compute_column_products
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.optimize.objective import (
     NormalEquations,
     join_columns,
@@ -150,7 +151,7 @@ class JointStep:
 
 
 def weight_columns(
-    problem: ShiftObjective, normal: NormalEquations, columns: EffectColumns
+    problem: DualClutchProblem, normal: NormalEquations, columns: EffectColumns
 ) -> WeightedColumns:
     """Compute the weighted sums of `columns` at the point of the expansion `normal`."""
     score = compute_column_products(problem, normal, columns.matrices)
@@ -298,7 +299,7 @@ def _join_tolerances(
 
 
 def take_joint_step(
-    problem: ShiftObjective, normal: NormalEquations, sums: WeightedColumns
+    problem: DualClutchProblem, normal: NormalEquations, sums: WeightedColumns
 ) -> JointStep:
     """Step from the expansion `normal` in the unknowns and the amounts of the effects."""
     size = normal.gradient.size

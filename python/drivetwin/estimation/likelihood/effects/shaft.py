@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
+from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     Effect,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.estimation.direct.load_balance import AERO
-from drivetwin.estimation.likelihood.data.shift_record import TORQUE
+from drivetwin.estimation.likelihood.data.torque_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     Effect,

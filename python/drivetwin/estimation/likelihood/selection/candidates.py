@@ -28,6 +28,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import TimedStages
 from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute_term_evidence
+from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
@@ -141,7 +142,7 @@ def _condition(
 
 def try_plants(fit: LikelihoodFit, priors: EffectPriors) -> LikelihoodFit:
     """Try elements in the plant; `fit` is that of the dual clutch."""
-    if not fit.problem.terms[0].scale_known or fit.plant is not None:
+    if not fit.problem.terms[0].compares(OUTPUT_TORQUE) or fit.plant is not None:
         return fit
     with _STAGES.enter("expansion"):
         expansion = expand_effects(fit, priors)

@@ -23,16 +23,21 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline
 from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
-from drivetwin.estimation.likelihood.data.shift_record import OUTPUT_TORQUE
+from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.joint_step import SIZES
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence, compute_covariance
-from drivetwin.estimation.likelihood.parametrization import PLANTS, PlantEffect
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.parametrization import PLANTS, DualClutchProblem, PlantEffect
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
+from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
+
+OWN_REACH = 3.0
+"""Distance from their prior within which unknowns of an added element are sought, in its standard
+deviations: a share of an inertia stays between 0 and 1 [-]."""
 
 
 class Minimum(Protocol):
@@ -106,18 +111,29 @@ def list_starts(effect: EffectId, prior: PriorValue) -> list[float]:
 
 
 def extend_problem(
-    problem: ShiftObjective,
+    problem: DualClutchProblem,
     point: ParameterVector,
     effect: EffectId,
     priors: Sequence[PriorValue],
-) -> tuple[ShiftObjective, ParameterVector]:
+) -> tuple[DualClutchProblem, ParameterVector]:
     """Add an effect to the plant; its unknowns come last, at the means of their `priors`."""
     outputs = [out for term in problem.terms for out in term.record.outputs]
     full = max(float(np.max(np.abs(o.values))) for o in outputs if o.name == OUTPUT_TORQUE)
     own = PlantEffect(effect, full)
     values = np.append(point.values, [one.value for one in priors])
     extended = ParameterVector((*point.names, *own.unknowns), values)
-    return problem.extend(own, priors), extended
+    terms = [replace(one, plant=replace(one.plant, plant_effect=own)) for one in problem.terms]
+    return problem.extend(terms, priors, OWN_REACH), extended
+
+
+def drop_effect(problem: DualClutchProblem) -> DualClutchProblem:
+    """Return the problem of the dual clutch alone, without unknowns of an added element."""
+    effect = problem.terms[0].plant.plant_effect
+    count = problem.lower.size - (0 if effect is None else len(effect.unknowns))
+    prior = Prior(problem.prior.mean[:count], problem.prior.precision[:count, :count])
+    terms = [replace(one, plant=replace(one.plant, plant_effect=None)) for one in problem.terms]
+    lower, upper = problem.lower[:count], problem.upper[:count]
+    return LikelihoodObjective(tuple(terms), prior, lower, upper)
 
 
 def refit_plant(
@@ -165,7 +181,7 @@ def compare_plants(
 
 
 def _build_fit(
-    fit: LikelihoodFit, found: OptimizeResult[ShiftObjective], plant: PlantEvidence
+    fit: LikelihoodFit, found: OptimizeResult[DualClutchProblem], plant: PlantEvidence
 ) -> LikelihoodFit:
     """Build the fit of an extended plant; it has the average over sampling modes of `fit`."""
     problem, point, normal = found.problem, found.point, found.normal

@@ -23,7 +23,7 @@ terms by several. Other modes move P0 and friction so little that Q decides betw
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -32,25 +32,27 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.budget import BudgetExceeded
 from drivetwin.estimation.likelihood.coloured_noise import compute_block_means, split_whitened
-from drivetwin.estimation.likelihood.data.shift_record import OUTPUTS, TORQUE, get_columns
+from drivetwin.estimation.likelihood.column_products import compute_column_products
+from drivetwin.estimation.likelihood.data.torque_record import (
+    OUTPUT_TORQUE,
+    OUTPUTS,
+    TORQUE,
+)
 from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
+    find_near_point,
     fit_local,
-    fit_lower_gear_only,
 )
-from drivetwin.estimation.likelihood.shift_objective import (
-    ShiftObjective,
-    ShiftTerm,
-    compute_column_products,
-)
+from drivetwin.estimation.likelihood.optimize.search import SEARCH
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem, DualClutchTerm
+from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.estimation.optimize.gauss_newton import solve_step
 from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report
-from drivetwin.shifts.shift import Shift
 
 SIGNALS = (*OUTPUTS, TORQUE)
 SPEEDS = tuple(name for name in OUTPUTS if name.endswith("speed"))
@@ -76,34 +78,47 @@ ROUNDS = 3
 """Most changes of mode: far off, the expansion promises the way, not the end of it."""
 
 
+def get_modes(problem: DualClutchProblem) -> frozenset[str]:
+    """Return the names of the signals that are of another mode than read, as in `Record.modes`."""
+    return frozenset[str]().union(*(term.record.modes for term in problem.terms))
+
+
+def select_modes(problem: DualClutchProblem, names: Collection[str]) -> DualClutchProblem:
+    """Set the sampling modes of all signals to those of `names`; all must be as read."""
+    terms = [
+        RecordedTerm.from_sensor_noise(p.plant, p.record.select_modes(names)) for p in problem.terms
+    ]
+    return replace(problem, terms=tuple(terms))
+
+
 def select_sampling_mode(
-    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
-) -> tuple[ShiftObjective, ShiftObjective]:
-    """The problem, which has signals as read, with the modes that promise least from `start`, and
-    with the speeds, or all slow outputs, of the other mode.
+    problem: DualClutchProblem, start: ParameterVector
+) -> tuple[ParameterVector, DualClutchProblem, DualClutchProblem]:
+    """Return a point near the measurement, the problem, which has signals as read, with the modes
+    that promise least from there, and with the speeds, or all slow outputs, of the other mode.
 
     From far off an expansion promises anything: at ten times the noise, where logs without an
-    output torque start, a mixture of modes by a thousand of Q. From there the lower gear alone is
-    brought onto the measurement first: in a pedal step means that are taken for samples may leave
-    so much that no search with them ends at a plausible minimum. Where that fails too the signals
-    are taken as read.
+    output torque start, a mixture of modes by a thousand of Q. From there a minimum near the
+    measurement is sought first; where there is none the signals are taken as read.
     """
     is_chosen = is_enabled(Mechanism.SAMPLING_MODES)
-    modes = _find_nearby_modes(problem, start) if is_chosen else frozenset()
-    if modes is None and (gear := fit_lower_gear_only(problem, start, shifts)) is not None:
-        modes = _find_nearby_modes(gear.problem, gear.point)
-    modes = modes or frozenset()
+    modes = frozenset[str]()
+    if is_chosen:
+        found = _find_nearby_modes(problem, start, MULTI_START.far_chi2)
+        if found is None and (near := find_near_point(problem, start)) is not None:
+            found, start = _find_nearby_modes(problem, near, SEARCH.near_chi2), near
+        modes = found or modes
     other = modes ^ (_far_apart(problem) or frozenset(SPEEDS))
-    return problem.select_modes(modes), problem.select_modes(other)
+    return start, select_modes(problem, modes), select_modes(problem, other)
 
 
-def _far_apart(problem: ShiftObjective) -> frozenset[str]:
+def _far_apart(problem: DualClutchProblem) -> frozenset[str]:
     """The outputs of which half a period is nearly a delay of the inputs and too far away for an
     expansion: the speeds of a log without an output torque, and all outputs where they are slow.
 
     That moves P0 and the delay of the engine torque by many standard deviations.
     """
-    if not problem.terms[0].scale_known:
+    if not problem.terms[0].compares(OUTPUT_TORQUE):
         return frozenset(SPEEDS)
     periods = [
         out.get_period(one.record.time) for one in problem.terms for out in one.record.outputs
@@ -112,16 +127,18 @@ def _far_apart(problem: ShiftObjective) -> frozenset[str]:
     return _shown(problem) if is_slow else frozenset()
 
 
-def _find_nearby_modes(problem: ShiftObjective, point: ParameterVector) -> frozenset[str] | None:
-    """The modes that promise least from `point`; None where it is far from the measurement."""
+def _find_nearby_modes(
+    problem: DualClutchProblem, point: ParameterVector, most: float
+) -> frozenset[str] | None:
+    """The modes that promise least from `point`; None where Q per sample is above `most` there."""
     weighted = problem.update_weighting(point)
     normal = weighted.normal(point)
-    if normal is None or normal.cost > MULTI_START.far_chi2 * problem.size:
+    if normal is None or normal.cost > most * problem.size:
         return None
     return _promising(weighted, point, normal)
 
 
-def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
+def refit_best_mode(problem: DualClutchProblem, best: LikelihoodFit) -> LikelihoodFit:
     """The fit with every signal of the likeliest mode.
 
     `problem` has signals as read, `best` is its fit with some modes. Without an output torque half
@@ -129,7 +146,7 @@ def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodF
     which it is: there the other mode of speeds is tried.
     """
 
-    tried = {best.problem.modes}
+    tried = {get_modes(best.problem)}
 
     def better_of(
         one: LikelihoodFit, modes: frozenset[str], start: ParameterVector
@@ -137,7 +154,7 @@ def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodF
         if modes in tried:
             return one
         tried.add(modes)
-        other = _nearby(problem.select_modes(modes), one, start)
+        other = _nearby(select_modes(problem, modes), one, start)
         return one if other is None or _rise(problem, one, other) >= 0.0 else other
 
     for _ in range(ROUNDS):
@@ -145,19 +162,21 @@ def refit_best_mode(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodF
         known, best = best, better_of(best, promising, best.point)
         if best is known:
             break
-    if problem.terms[0].scale_known:
+    if problem.terms[0].compares(OUTPUT_TORQUE):
         return best
-    return better_of(best, best.problem.modes ^ frozenset(SPEEDS), _start_of_other_outputs(best))
+    return better_of(
+        best, get_modes(best.problem) ^ frozenset(SPEEDS), _start_of_other_outputs(best)
+    )
 
 
-def refit_slow_outputs(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
+def refit_slow_outputs(problem: DualClutchProblem, best: LikelihoodFit) -> LikelihoodFit:
     """The fit, or where the outputs of a log with an output torque are slow that with all of them
     of the other mode, if it is likelier. `problem` has signals as read."""
     outputs = _far_apart(problem)
-    if not outputs or not problem.terms[0].scale_known:
+    if not outputs or not problem.terms[0].compares(OUTPUT_TORQUE):
         return best
-    modes = best.problem.modes ^ outputs
-    other = _nearby(problem.select_modes(modes), best, _start_of_other_outputs(best))
+    modes = get_modes(best.problem) ^ outputs
+    other = _nearby(select_modes(problem, modes), best, _start_of_other_outputs(best))
     if other is None or _rise(problem, best, other) >= 0.0:
         return best
     try:
@@ -167,21 +186,21 @@ def refit_slow_outputs(problem: ShiftObjective, best: LikelihoodFit) -> Likeliho
 
 
 def refit_mode_beside(
-    problem: ShiftObjective, best: LikelihoodFit, effects: WeightedColumns
+    problem: DualClutchProblem, best: LikelihoodFit, effects: WeightedColumns
 ) -> LikelihoodFit:
     """Fit with the sampling modes that are likeliest beside effects that the log shows.
 
     What an effect does may look like half a sample. `problem` has signals as read.
     """
     choices = _choices(best.problem, best.point, best.normal, effects)
-    modes = _flipped(best.problem.modes, choices.flips[int(np.argmin(choices.left))])
-    if modes == best.problem.modes:
+    modes = _flipped(get_modes(best.problem), choices.flips[int(np.argmin(choices.left))])
+    if modes == get_modes(best.problem):
         return best
-    return _nearby(problem.select_modes(modes), best, best.point) or best
+    return _nearby(select_modes(problem, modes), best, best.point) or best
 
 
 def average_modes(
-    problem: ShiftObjective, best: LikelihoodFit, effects: WeightedColumns | None = None
+    problem: DualClutchProblem, best: LikelihoodFit, effects: WeightedColumns | None = None
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with mean and covariance over all modes, weighted by their likelihood, and findings
     on modes that the log hardly determines.
@@ -205,7 +224,7 @@ def average_modes(
 
 
 def widen_over_modes(
-    problem: ShiftObjective, best: LikelihoodFit
+    problem: DualClutchProblem, best: LikelihoodFit
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """The fit with its covariance widened up to the minimum that has the outputs which lie
     `_far_apart` of the other mode, and a finding; as it is where the deviance rises to there by
@@ -213,10 +232,10 @@ def widen_over_modes(
     outputs = _far_apart(problem) & _shown(problem)
     if not outputs:
         return best, []
-    modes, start = best.problem.modes ^ outputs, _start_of_other_outputs(best)
+    modes, start = get_modes(best.problem) ^ outputs, _start_of_other_outputs(best)
     try:
         other = fit_local(
-            problem.select_modes(modes), start, WORSE * best.normal.cost / problem.size
+            select_modes(problem, modes), start, WORSE * best.normal.cost / problem.size
         )
     except BudgetExceeded:  # nobody knows: what shows the same may be as good
         far = start.values - best.point.values
@@ -251,7 +270,7 @@ def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
     return np.asarray(weight / np.sum(weight))
 
 
-def _fitted(problem: ShiftObjective, best: LikelihoodFit, choices: _Choices) -> _Choices:
+def _fitted(problem: DualClutchProblem, best: LikelihoodFit, choices: _Choices) -> _Choices:
     """The choices as seen from the minimum of the first, those fitted that would matter: what an
     expansion says of a minimum far away is too rough to weigh it by.
 
@@ -262,21 +281,21 @@ def _fitted(problem: ShiftObjective, best: LikelihoodFit, choices: _Choices) -> 
     left, steps = seen.left, seen.steps
     far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
     for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
-        modes = _flipped(best.problem.modes, choices.flips[k])
-        other = _nearby(problem.select_modes(modes), best, best.point)
+        modes = _flipped(get_modes(best.problem), choices.flips[k])
+        other = _nearby(select_modes(problem, modes), best, best.point)
         if other is None:
             left[k] = np.inf
             continue
         left[k] = _rise(problem, best, other)
         steps[k] = other.point.values - best.point.values
-        first = problem.select_modes(best.problem.modes)
+        first = select_modes(problem, get_modes(best.problem))
         if left[k] < TIE and (back := _nearby(first, other, other.point)):
             left[0] = min(left[0], _rise(problem, best, back))
     return seen
 
 
 def _nearby(
-    problem: ShiftObjective, best: LikelihoodFit, start: ParameterVector
+    problem: DualClutchProblem, best: LikelihoodFit, start: ParameterVector
 ) -> LikelihoodFit | None:
     """The minimum from `start`; None where it is surely no better than `best`, of other modes, or
     not found with the work that is left."""
@@ -286,10 +305,10 @@ def _nearby(
         return None
 
 
-def _rise(problem: ShiftObjective, one: LikelihoodFit, other: LikelihoodFit) -> float:
+def _rise(problem: DualClutchProblem, one: LikelihoodFit, other: LikelihoodFit) -> float:
     """Rise from `one` to the `other` of what modes compare by, with their prices: the deviance
     where all outputs are of the other mode, Q where not."""
-    modes, others = one.problem.modes, other.problem.modes
+    modes, others = get_modes(one.problem), get_modes(other.problem)
     prices = _price(problem, others) - _price(problem, modes)
     if _shown(problem) <= modes ^ others:
         return other.deviance - one.deviance + prices
@@ -333,11 +352,11 @@ def report_modes(modes: frozenset[str]) -> list[Finding]:
 
 
 def _promising(
-    problem: ShiftObjective, point: ParameterVector, normal: NormalEquations
+    problem: DualClutchProblem, point: ParameterVector, normal: NormalEquations
 ) -> frozenset[str]:
     """Names of the signals that are better taken for something else than read."""
     choices = _choices(problem, point, normal)
-    return _flipped(problem.modes, choices.flips[int(np.argmin(choices.left))])
+    return _flipped(get_modes(problem), choices.flips[int(np.argmin(choices.left))])
 
 
 def _flipped(modes: frozenset[str], flips: FloatArray) -> frozenset[str]:
@@ -345,7 +364,7 @@ def _flipped(modes: frozenset[str], flips: FloatArray) -> frozenset[str]:
     return modes ^ {name for name, flip in zip(SIGNALS, flips, strict=True) if flip}
 
 
-def _price(problem: ShiftObjective, modes: frozenset[str]) -> float:
+def _price(problem: DualClutchProblem, modes: frozenset[str]) -> float:
     """Compute the penalty of modes other than read: twice the logarithm of the odds against
     them."""
     speeds = _shown(problem).intersection(SPEEDS)
@@ -355,7 +374,7 @@ def _price(problem: ShiftObjective, modes: frozenset[str]) -> float:
     return COMMON_PRICE * common + RARE_PRICE * rare
 
 
-def _shown(problem: ShiftObjective) -> frozenset[str]:
+def _shown(problem: DualClutchProblem) -> frozenset[str]:
     """Names of the outputs that the log holds."""
     return frozenset(out.name for term in problem.terms for out in term.record.outputs)
 
@@ -377,7 +396,7 @@ class _Choices:
 
 
 def _choices(
-    problem: ShiftObjective,
+    problem: DualClutchProblem,
     point: ParameterVector,
     normal: NormalEquations,
     effects: WeightedColumns | None = None,
@@ -397,24 +416,23 @@ def _choices(
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
     gradients = gradient + flips @ cross.T
     steps = np.array([solve_step(information, one) for one in gradients])
-    price = np.array([_price(problem, _flipped(problem.modes, row)) for row in flips])
+    price = np.array([_price(problem, _flipped(get_modes(problem), row)) for row in flips])
     followed = np.sum(gradients * steps, axis=1)
     before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
     return _Choices(flips, before + followed + price, steps[:, : point.values.size])
 
 
-def _changes(term: ShiftTerm, point: ParameterVector) -> FloatArray:
+def _changes(term: DualClutchTerm, point: ParameterVector) -> FloatArray:
     """Compute the change (n, m) of a run by the other mode of each of `SIGNALS`, one column
     each."""
-    run = term.simulate(point)
-    assert run is not None, "a fit can be simulated"
     record = term.record
-    columns, found, first = get_columns(run), np.zeros((record.size, len(SIGNALS))), 0
+    columns = term.show(point, term.build_task(point).simulate().columns)
+    found, first = np.zeros((record.size, len(SIGNALS))), 0
     for out in record.outputs:
         rows = slice(first, first + out.values.size)
         first = rows.stop
         column = columns[out.name]
-        change = out.sample_other_mode(run.time, column) - out.sample(run.time, column)
+        change = out.sample_other_mode(record.time, column) - out.sample(record.time, column)
         found[rows, SIGNALS.index(out.name)] = change
     bend = record.interpolate_bend(term.plant.get_value(point, "te_delay"))
     sign = -1.0 if record.curved else 1.0

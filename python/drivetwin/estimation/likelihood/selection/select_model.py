@@ -20,48 +20,64 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
+from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.diagnostics.identifiability import locate_bounds
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covariance
+from drivetwin.estimation.likelihood.effects.shaft import ROUNDING
+from drivetwin.estimation.likelihood.fit import (
+    LikelihoodFit,
+    PlantEvidence,
+    compute_covariance,
+)
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.optimize.multistart import (
     MULTI_START,
     NoConvergence,
+    compute_spread,
     fit_local,
     fit_multistart,
     refine,
-    scale_friction,
 )
+from drivetwin.estimation.likelihood.optimize.search import find_best_draw
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.candidates import (
     GROWING_LOAD,
     LOAD_OF_EACH_SHIFT,
     find_absent_terms,
 )
+from drivetwin.estimation.likelihood.selection.plants import (
+    compare_plants,
+    drop_effect,
+    extend_problem,
+)
 from drivetwin.estimation.likelihood.selection.sampling_mode import (
     average_modes,
+    get_modes,
     refit_best_mode,
     refit_mode_beside,
     refit_slow_outputs,
     report_modes,
+    select_modes,
     select_sampling_mode,
     widen_over_modes,
 )
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate_set import report_growth
 from drivetwin.findings import Finding
-from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.spec import PriorValue
 
 
 @dataclass(frozen=True)
 class SelectionSettings:
     """Settings of the model selection; work is counted in passes over the log."""
 
-    max_work: float = 700.0
-    """Work of the search: one from a bad start takes 450 passes [passes]."""
+    max_work: float = 2000.0
+    """Work of the search: four rounds from draws [passes]."""
     max_restricted_work: float = MAX_REFIT_WORK
     """Work of the search that starts from a minimum of the wider model: it takes 160 passes
     [passes]."""
@@ -70,6 +86,8 @@ class SelectionSettings:
 
 
 SELECTION = SelectionSettings()
+LEVEL = "mu_c"
+"""Coefficient of a friction law by which draws scale it."""
 _STAGES = TimedStages(
     "model selection",
     ("search", "bounds", "slow outputs", "restriction", "averaging", "other outputs"),
@@ -90,13 +108,12 @@ def select_model(
 
     Raises IdentificationError where no variant converges.
     """
-    shifts = [s.shift for s in signals]
     growing = {**guess, AERO: max(guess.get(AERO, 0.0), SELECTION.min_aero)}
     constant = {name: value for name, value in guess.items() if name != AERO}
     first = growing if is_enabled(Mechanism.LOAD_GROWTH) else constant
     problem, start = build_problem(signals, drivelines, loss_law, first, hilly=True)
     with _STAGES.enter("search"), limit_evaluations(SELECTION.max_work) as search:
-        best = fit_candidates(problem, start, shifts)
+        best = fit_candidates(problem, start)
     with _STAGES.enter("bounds"), limit_evaluations(min(MAX_REFIT_WORK, search.left)):
         best = retry_from_card(problem, best)
     with (
@@ -110,7 +127,7 @@ def select_model(
         guess = constant if GROWING_LOAD in absent else growing
         hilly = LOAD_OF_EACH_SHIFT not in absent
         narrower = build_problem(signals, drivelines, loss_law, guess, hilly=hilly)
-        best, problem = _restrict(best, point, narrower, shifts) or (best, problem)
+        best, problem = _restrict(best, point, narrower) or (best, problem)
     notes = _report_growth(best)
     with (
         _STAGES.enter("averaging", "modes of signals"),
@@ -123,11 +140,15 @@ def select_model(
         )
     with _STAGES.enter("other outputs"), limit_evaluations(MAX_REFIT_WORK):
         best, either = widen_over_modes(problem, best)
-    return best, (*notes, *report_modes(best.problem.modes), *dict.fromkeys((*doubts, *either)))
+    return best, (
+        *notes,
+        *report_modes(get_modes(best.problem)),
+        *dict.fromkeys((*doubts, *either)),
+    )
 
 
 def _average_modes(
-    problem: ShiftObjective, best: LikelihoodFit, priors: EffectPriors
+    problem: DualClutchProblem, best: LikelihoodFit, priors: EffectPriors
 ) -> tuple[LikelihoodFit, list[Finding]]:
     """Average over sampling modes, with the effects as further unknowns.
 
@@ -147,9 +168,8 @@ def _average_modes(
 def _restrict(
     wider: LikelihoodFit,
     point: ParameterVector,
-    narrower: tuple[ShiftObjective, ParameterVector],
-    shifts: Sequence[Shift],
-) -> tuple[LikelihoodFit, ShiftObjective] | None:
+    narrower: tuple[DualClutchProblem, ParameterVector],
+) -> tuple[LikelihoodFit, DualClutchProblem] | None:
     """Fit the model without the effects that the log does not show, and return its problem.
 
     Returns None if the log shows all effects, or if the work runs out: the wider model is correct
@@ -162,60 +182,109 @@ def _restrict(
     if left_out == [AERO] and wider.point[AERO] == 0.0:
         return _drop_unknown(wider, problem, AERO), problem
     try:
-        of_modes = problem.select_modes(wider.problem.modes)
-        return fit_multistart(of_modes, _copy_values(start, point), shifts, thorough=False), problem
+        of_modes = select_modes(problem, get_modes(wider.problem))
+        return fit_multistart(of_modes, _copy_values(start, point), thorough=False), problem
     except BudgetExceeded:
         return None
 
 
-def fit_candidates(
-    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
-) -> LikelihoodFit:
+def fit_candidates(problem: DualClutchProblem, start: ParameterVector) -> LikelihoodFit:
     """Fit with every signal in its likeliest sampling mode.
 
     Raises IdentificationError where it does not converge with the likeliest modes.
     """
-    likely, other = select_sampling_mode(problem, start, shifts)
-    best = _try_fit(likely, start, shifts) or fit_multistart(
-        other, start, shifts, restarts=MULTI_START.shaft_factors[:1]
-    )
+    near, likely, other = select_sampling_mode(problem, start)
+    draws = near is start
+    best = _try_fit(likely, near, draws) or fit_multistart(other, near, draws=draws)
     best = refit_best_mode(problem, best)
     if best.chi2 < MULTI_START.accept_chi2:
         return best
-    second = refine(best, problem.select_modes(best.problem.modes), start, shifts)
+    second = refine(best, select_modes(problem, get_modes(best.problem)), near)
     return best if second is best else refit_best_mode(problem, second)
 
 
-def retry_from_card(problem: ShiftObjective, best: LikelihoodFit) -> LikelihoodFit:
+def fit_with_backlash(
+    problem: DualClutchProblem, start: ParameterVector, priors: Sequence[PriorValue]
+) -> LikelihoodFit | None:
+    """Fit with backlash in the plant; None without a reversal of the torque or a minimum.
+
+    Crossing the gap moves the whole oscillation of the shaft, so that the dual clutch may reach no
+    minimum at all. `problem` is that of the dual clutch with signals as read, `priors` are those of
+    the unknowns of the gap.
+    """
+    if not _is_reversed(problem):
+        return None
+    extended, point = extend_problem(problem, start, EffectId.BACKLASH, priors)
+    try:
+        with limit_evaluations(SELECTION.max_work):
+            found = fit_candidates(extended, point)
+    except IdentificationError:
+        return None
+    return replace(found, plant=_compare(found, priors))
+
+
+def _is_reversed(problem: DualClutchProblem) -> bool:
+    """Return whether the measured output torque goes to either side of zero, beyond the rounding
+    of its sign."""
+    outputs = [out for term in problem.terms for out in term.record.outputs]
+    torques = [out.values for out in outputs if out.name == OUTPUT_TORQUE]
+    if not torques:
+        return False
+    low, high = min(map(np.min, torques)), max(map(np.max, torques))
+    least = ROUNDING * max(abs(low), abs(high))
+    return bool(low < -least and high > least)
+
+
+def _compare(found: LikelihoodFit, priors: Sequence[PriorValue]) -> PlantEvidence:
+    """Compare a fit with the dual clutch, sought from the same unknowns with the same weighting.
+
+    Where that cannot be simulated it counts as far as a search may be from the measurement.
+    """
+    plain = drop_effect(found.problem)
+    count = plain.lower.size
+    start = ParameterVector(found.point.names[:count], found.point.values[:count])
+    other = minimise(plain, start)
+    if other is None:
+        nats = 0.5 * (MULTI_START.far_chi2 * found.problem.size - found.normal.cost)
+        return PlantEvidence(EffectId.BACKLASH, nats, np.zeros_like(found.point.values), count)
+    return compare_plants(other, found, EffectId.BACKLASH, found.chi2, priors)
+
+
+def retry_from_card(problem: DualClutchProblem, best: LikelihoodFit) -> LikelihoodFit:
     """Fit again from the card's P0 where a P0 has ended at a bound; return the better fit.
 
     Beyond the valley between two minima, P0 and the friction level compensate for each other. The
-    levels are sought anew by simulation.
+    levels are sought anew by draws.
     """
     ended = np.logical_or(*locate_bounds(best)) & (np.diag(problem.prior.precision) > 0.0)
-    fills = [k for k, name in enumerate(best.point.names) if name.endswith(".P0") and ended[k]]
+    names = best.point.names
+    fills = [k for k, name in enumerate(names) if name.endswith(".P0") and ended[k]]
     if not fills:
         return best
     values = best.point.values.copy()
     values[fills] = problem.prior.mean[fills]
-    problem = problem.select_modes(best.problem.modes)
+    problem, start = (
+        select_modes(problem, get_modes(best.problem)),
+        best.point.replace_values(values),
+    )
+    is_level = np.array([name.endswith(f".{LEVEL}") for name in names])
     try:
-        start = scale_friction(problem, best.point.replace_values(values))
-        found = fit_local(problem, start)
+        spread = np.where(is_level, compute_spread(problem, start), 0.0)
+        found = fit_local(problem, find_best_draw(problem, start, spread))
     except BudgetExceeded:
         return best
     return best if found is None or found.chi2 >= best.chi2 else found
 
 
 def _try_fit(
-    problem: ShiftObjective, start: ParameterVector, shifts: Sequence[Shift]
+    problem: DualClutchProblem, start: ParameterVector, draws: bool
 ) -> LikelihoodFit | None:
     """Fit up to the first plausible minimum; None if there is none.
 
     Raises NoConvergence where none is near.
     """
     try:
-        return fit_multistart(problem, start, shifts, thorough=False)
+        return fit_multistart(problem, start, thorough=False, draws=draws)
     except NoConvergence:
         raise
     except IdentificationError:
@@ -237,7 +306,7 @@ def _report_growth(best: LikelihoodFit) -> list[Finding]:
     return [report_growth(best.point[AERO], std, best.problem.terms[0].plant.mean_speed)]
 
 
-def _drop_unknown(best: LikelihoodFit, narrower: ShiftObjective, name: str) -> LikelihoodFit:
+def _drop_unknown(best: LikelihoodFit, narrower: DualClutchProblem, name: str) -> LikelihoodFit:
     """Return the fit of the model without an unknown, where that of the wider one has zero for it.
 
     It is the same minimum. An unknown at its bound has no place in the covariance: it would widen

@@ -23,8 +23,12 @@ from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
-from drivetwin.estimation.likelihood.parametrization import LAW, LOG_SPECIFIC, ShiftModel
-from drivetwin.estimation.likelihood.shift_objective import ShiftObjective
+from drivetwin.estimation.likelihood.parametrization import (
+    LAW,
+    LOG_SPECIFIC,
+    DualClutchPlant,
+    DualClutchProblem,
+)
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.suggestion import CardNumber, CardNumberKind
@@ -38,7 +42,7 @@ DIRECT = ("J_out", "te_delay", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 
 
 def compute_parameters(
-    problem: ShiftObjective,
+    problem: DualClutchProblem,
     point: ParameterVector,
     signals: Sequence[ShiftSignals],
     slips: Mapping[str, float] | None = None,
@@ -77,14 +81,14 @@ def compute_parameters(
 
 
 def compute_friction(
-    structure: ShiftModel, point: ParameterVector, element: str, slip: float
+    structure: DualClutchPlant, point: ParameterVector, element: str, slip: float
 ) -> float:
     """Compute μ of an element at one slip [rad/s]."""
     theta = np.array(structure.get_law(point, element))
     return float(evaluate_stribeck(theta, np.array([slip]))[0][0])
 
 
-def compute_laws(problem: ShiftObjective, point: ParameterVector) -> dict[str, float]:
+def compute_laws(problem: DualClutchProblem, point: ParameterVector) -> dict[str, float]:
     """Compute the coefficients of the friction laws of all elements, by `make_law_id`."""
     return {
         make_law_id(element.name, key): value
@@ -117,7 +121,7 @@ def list_absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     return ("eta", *(f"J_prime_{gear}" for gear in gears), *dict.fromkeys(others))
 
 
-def compute_oscillation(structure: ShiftModel, point: ParameterVector) -> tuple[float, float]:
+def compute_oscillation(structure: DualClutchPlant, point: ParameterVector) -> tuple[float, float]:
     """Compute the damped frequency [Hz] and damping ratio of the lock-up oscillation."""
     after = structure.compute_ratio_after(point)
     inertia = structure.get_value(point, "J_e")
@@ -132,7 +136,7 @@ def compute_oscillation(structure: ShiftModel, point: ParameterVector) -> tuple[
 
 
 def compute_jacobian(
-    problem: ShiftObjective,
+    problem: DualClutchProblem,
     point: ParameterVector,
     std: FloatArray,
     signals: Sequence[ShiftSignals],

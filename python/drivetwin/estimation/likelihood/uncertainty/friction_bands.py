@@ -9,12 +9,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.direct.friction_law import build_law_derivatives, evaluate_stribeck
+from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.friction import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.motion import find_loaded_slips
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.likelihood.slip_contact import find_loaded_slips
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import differentiate
 from drivetwin.estimation.result.cause import SHOWN, Group
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
@@ -99,7 +100,7 @@ def _build_curve(
         stribeck=Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v),
         method=METHOD,
         stribeck_covariance=to_law @ covariance @ to_law.T,
-        over_eta=not fit.problem.terms[0].scale_known,
+        over_eta=not fit.problem.terms[0].compares(OUTPUT_TORQUE),
     )
     return _set_band(curve, mu, np.sqrt(propagate_variance(slopes.T, covariance)))
 

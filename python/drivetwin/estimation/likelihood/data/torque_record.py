@@ -49,7 +49,7 @@ _BEYOND = 2.0 * RECORD.max_delay
 
 
 @dataclass(frozen=True, eq=False)
-class ShiftRecord(RecordedData):
+class TorqueRecord(RecordedData):
     """One shift's span of a log.
 
     The inputs are the engine torque, fresh values at their stamps held at both ends, and the
@@ -95,7 +95,7 @@ class ShiftRecord(RecordedData):
         means = frozenset(out.name for out in self.outputs if out.window > 0.0)
         return means | {TORQUE} if self.curved else means
 
-    def select_modes(self, names: Collection[str]) -> ShiftRecord:
+    def select_modes(self, names: Collection[str]) -> TorqueRecord:
         """Set the sampling modes of `names` in a record of point samples and straight lines."""
         outputs = [
             out.convert_to_means(self.time) if out.name in names else out for out in self.outputs
@@ -152,7 +152,7 @@ def get_columns(run: Trajectory) -> dict[str, FloatArray]:
 
 def build_record(
     signals: ShiftSignals, span: Span, fills: Mapping[str, PriorValue] | None = None
-) -> ShiftRecord:
+) -> TorqueRecord:
     """Build the record of one shift over `span` [s]; `fills` is P0 [Pa] by element from the card.
 
     An output that stops before the span, or starts at its end, is not compared. The first sample of
@@ -204,7 +204,7 @@ def build_record(
         windows[name] = build_valve_windows(p.time)
     fast = {name: one.values - smooth[name] for name, one in inputs.items()}
     noise, rounding = _measure_noise(signals, inputs), _measure_rounding(signals)
-    return ShiftRecord(
+    return TorqueRecord(
         time,
         outputs,
         {name: Signal(one.time, smooth[name]) for name, one in inputs.items()},

@@ -1,19 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""Pressure, slip and friction torque of one element in a simulated shift."""
+"""Motion of a dual clutch in a simulated shift: its trajectory, slip and friction torques."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.shift_objective import ShiftTerm
+from drivetwin.errors import InputError, SimulationError
+from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
 from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.simulation.driveline_run import build_trajectory, list_motion_outputs
 from drivetwin.simulation.dual_clutch import Trajectory
 
 SLIPPING = 1e-6
 """Slip [rad/s] above which a simulated element is not locked."""
+
+
+def simulate_motion(term: DualClutchTerm, point: ParameterVector) -> Trajectory | None:
+    """Simulate the motion at `point`; None if the simulation fails or does not reach the end."""
+    names = [one.name for one in term.plant.build_model(point).elements]
+    try:
+        run = replace(term.build_task(point), outputs=list_motion_outputs(names)).simulate()
+    except (InputError, SimulationError):
+        return None
+    return build_trajectory(run, names) if run.status == "completed" else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +45,7 @@ class Contact:
 
 
 def evaluate_contact(
-    term: ShiftTerm, point: ParameterVector, run: Trajectory, name: str
+    term: DualClutchTerm, point: ParameterVector, run: Trajectory, name: str
 ) -> Contact:
     """Evaluate element `name` along `run`, the simulation of the term at `point`."""
     middle = 0.5 * (run.time[1:] + run.time[:-1])
@@ -51,12 +63,12 @@ def evaluate_contact(
     return Contact(middle, slip, above, one.friction.evaluate(slip), per_mu)
 
 
-def find_loaded_slips(term: ShiftTerm, point: ParameterVector, name: str) -> FloatArray:
+def find_loaded_slips(term: DualClutchTerm, point: ParameterVector, name: str) -> FloatArray:
     """Sizes of the slip (n,) [rad/s] over the steps in which element `name` slips under pressure.
 
     Empty where the term does not have it. `point` is one that can be simulated.
     """
-    run = term.simulate(point)
+    run = simulate_motion(term, point)
     assert run is not None, "a fit can be simulated"
     contact = evaluate_contact(term, point, run, name)
     return np.asarray(np.abs(contact.slip[contact.per_mu != 0.0]))

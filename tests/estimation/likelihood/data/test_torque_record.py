@@ -12,7 +12,9 @@ import pytest
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.data.shift_record import build_record
+from drivetwin.estimation.likelihood.data.torque_record import build_record
+from drivetwin.estimation.likelihood.motion import simulate_motion
+from drivetwin.estimation.likelihood.selection.sampling_mode import select_modes
 from drivetwin.estimation.result.estimate import Z95
 from tests.estimation.likelihood.fixtures import bench, problem
 from tests.support.bench import identify_run
@@ -80,9 +82,10 @@ def test_each_stay_at_a_level_has_an_error_of_its_own() -> None:
 def test_a_mean_is_that_of_the_motion_since_the_sample_before() -> None:
     posed, point = problem(bench())
     (term,) = posed.terms
-    (means,) = posed.select_modes({"engine_speed"}).terms
+    (means,) = select_modes(posed, {"engine_speed"}).terms
     assert means.record.size == term.record.size, "the first period is left out of both"
-    run = term.simulate(point)
+    run = simulate_motion(term, point)
+    assert run
     place = next(one.place for one in term.record.outputs if one.name == "engine_speed")
     first = next(k for k, out in enumerate(term.record.outputs) if out.name == "engine_speed")
     rows = slice(sum(one.values.size for one in term.record.outputs[:first]), None)
