@@ -16,7 +16,7 @@ from benchmarks.fit.problem import (
     set_start,
 )
 from drivetwin.gearbox.card import load_gearbox
-from drivetwin.gearbox.network import build_network_elements
+from drivetwin.gearbox.reduction import build_network_elements
 from drivetwin.modeling.model import Model
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element

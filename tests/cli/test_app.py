@@ -20,7 +20,7 @@ from typer.core import TyperGroup
 from drivetwin._util.request import COMMANDS as REQUESTS
 from drivetwin._util.request import Request, get_arguments
 from drivetwin.cli import app, main
-from drivetwin.cli.examples import EXAMPLES
+from drivetwin.cli.command_group import EXAMPLES
 from drivetwin.errors import InputError
 
 

@@ -12,7 +12,7 @@ import pytest
 from drivetwin.cli import main
 from drivetwin.cli.observe import collect_channels
 from drivetwin.logs.read import read_raw
-from drivetwin.observer.result import Band, Observation
+from drivetwin.observer.linear_model import Band, Observation
 from tests.observer.conftest import Bench, bench
 from tests.shifts.test_shift_split_gears import CHAIN
 

@@ -14,7 +14,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.observer.result import Observation
+from drivetwin.observer.linear_model import Observation
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.twin.build import build_twin

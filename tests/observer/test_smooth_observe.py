@@ -11,7 +11,7 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DamagedChannelError, MissingChannelError, MissingParameterError
 from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.observer.result import Band
+from drivetwin.observer.linear_model import Band
 from drivetwin.observer.smooth import estimate_torques
 from tests.observer.conftest import Bench, brief
 from tests.support.arrays import FloatArray

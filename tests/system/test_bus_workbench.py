@@ -14,8 +14,8 @@ from drivetwin import Method
 from drivetwin.cli import main
 from drivetwin.errors import InputError
 from drivetwin.workbench.sessions import Sessions
-from drivetwin.workbench.steps import assess_steps
 from drivetwin.workbench.views.export import Record, make_product
+from drivetwin.workbench.views.stepper import assess_steps
 from drivetwin.workbench.workspace import Folder
 from tests.support.bus_logs import BUS_LOGS, RATIOS, write_bus_logs
 from tests.workbench.conftest import finish

@@ -40,7 +40,7 @@ def escape_line(text: str) -> str:
 def escape_values(value: object) -> object:
     """Return a JSON value with all its texts and keys escaped."""
     if isinstance(value, str):
-        return escape_text(value)
+        return value if value.isprintable() else escape_text(value)
     if isinstance(value, Mapping):
         return {escape_text(str(key)): escape_values(one) for key, one in value.items()}
     if isinstance(value, list | tuple):

@@ -17,7 +17,7 @@ from drivetwin.report.blocks import Outcome, Tone, make_notes
 
 if TYPE_CHECKING:
     from drivetwin.logs.raw import RawChannel
-    from drivetwin.observer.result import Observation
+    from drivetwin.observer.linear_model import Observation
     from drivetwin.shifts.shift import Shift
 
 

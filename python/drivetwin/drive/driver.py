@@ -35,8 +35,16 @@ from drivetwin.drive.result import (
     list_energy_outputs,
     list_outputs,
 )
-from drivetwin.drive.schedule import Knots, Schedule
-from drivetwin.drive.shift_plan import CLOSE, FILL, OPEN, RAMP, ShiftPlan, compute_pressure
+from drivetwin.drive.shift_plan import (
+    CLOSE,
+    FILL,
+    OPEN,
+    RAMP,
+    Knots,
+    Schedule,
+    ShiftPlan,
+    compute_pressure,
+)
 from drivetwin.errors import SimulationError
 from drivetwin.gearbox import Gearbox, Reduction, reduce
 from drivetwin.simulation.dual_clutch import FloatArray

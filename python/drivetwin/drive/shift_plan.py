@@ -1,23 +1,53 @@
 # SPDX-License-Identifier: MIT
-"""Pressures of a shift from one element to another.
-
-In a power-on upshift or power-off downshift the input torque opposes the change of speed: the
-on-coming element first takes over the torque, then brings the input to its new speed. In the other
-two kinds the input torque itself changes the speed: the pressure of the off-going element controls
-the pace, and the on-coming element engages at synchronism. All torques are those of the dual-clutch
-form (THEORY section 2): η = 1, `J ω_in' = T_in - Σ T_k / i_c,k`.
-"""
+"""Plan of the shifts of a drive, and what the driver requests over time."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.drive.schedule import Knots, Schedule
 from drivetwin.gearbox import Drive, Reduction
 from drivetwin.gearbox.spec import Capacity
+from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.vehicle.shift_kind import ShiftKind
+
+Knots = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Inputs by name, each linear between its knots (time [s], value SI), constant afterwards."""
+
+    knots: Mapping[str, Knots]
+
+    def add_knots(self, name: str, start: float, *points: tuple[float, float]) -> Schedule:
+        """Keep an input until `start` [s], then lead it through `points` (time after start, value).
+
+        What was decided beyond `start` is replaced: the input leaves from where it is then.
+        """
+        old = self.knots[name]
+        here = float(np.interp(start, *np.transpose(old)))
+        kept = tuple(knot for knot in old if knot[0] < start)
+        new = tuple((start + after, value) for after, value in points)
+        return Schedule({**self.knots, name: (*kept, (start, here), *new)})
+
+    def evaluate(self, name: str, time: FloatArray) -> FloatArray:
+        """Values (n,) of an input at `time` (n,) [s]."""
+        knots, values = np.transpose(self.knots[name])
+        return np.asarray(np.interp(time, knots, values), dtype=np.float64)
+
+    def to_signals(self, end: float) -> dict[str, Signal]:
+        """Return all inputs from 0 to `end` [s]."""
+        found = {}
+        for name, knots in self.knots.items():
+            inside = [knot for knot in knots if knot[0] < end]
+            last = float(np.interp(end, *np.transpose(knots)))
+            time, values = np.transpose([*inside, (end, last)])
+            found[name] = Signal(np.ascontiguousarray(time), np.ascontiguousarray(values))
+        return found
+
 
 FILL = 0.12
 """Time to fill the on-coming element, while the off-going one falls to what it has to hold, s."""

@@ -11,8 +11,7 @@ from drivetwin.gearbox.maneuver import (
     describe_ratio_differences,
     solve_gear,
 )
-from drivetwin.gearbox.network import build_network_elements
-from drivetwin.gearbox.reduction import Reduction, reduce
+from drivetwin.gearbox.reduction import Reduction, build_network_elements, reduce
 from drivetwin.gearbox.spec import Drive, Gearbox
 
 __all__ = [

@@ -17,8 +17,7 @@ from drivetwin.gearbox.maneuver import (
     plan,
     solve_gear,
 )
-from drivetwin.gearbox.network import build_network_elements
-from drivetwin.gearbox.reduction import Reduction
+from drivetwin.gearbox.reduction import Reduction, build_network_elements
 from drivetwin.gearbox.spec import Drive
 from drivetwin.simulation.driveline import (
     SHAFT,

@@ -16,8 +16,7 @@ import numpy as np
 
 from drivetwin._native import gear_statics as native_gear_statics
 from drivetwin.errors import InputError, NoFixedRatioError, ReductionError
-from drivetwin.gearbox.network import as_json
-from drivetwin.gearbox.reduction import Reduction
+from drivetwin.gearbox.reduction import Reduction, as_json
 from drivetwin.gearbox.spec import POWER_SPLIT_REMEDY, Capacity, Drive, Gearbox
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.element_schema import GROUND

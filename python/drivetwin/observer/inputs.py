@@ -15,8 +15,7 @@ from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.prepare import collect_pressures
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
-from drivetwin.observer.linear_model import BoolArray, Course
-from drivetwin.observer.result import FloatArray
+from drivetwin.observer.linear_model import BoolArray, Course, FloatArray
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The driveline of one shift as a linear model with known locks (THEORY section 3).
+"""Driveline of a shift as a linear model with known locks (theory section 3); observed torques.
 
 State x = (ω_e, ω_out, ω_w, twist, e, m_A, m_B, T_v): e is the error of the engine torque as read,
 m the relative error of each element's torque while it slips, T_v the load at the wheel. In the
@@ -19,8 +19,52 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.observer.result import FloatArray
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """A torque [N m] and one standard deviation of its error, both (n,)."""
+
+    value: FloatArray
+    std: FloatArray
+
+    @property
+    def lower(self) -> FloatArray:
+        """Lower end of the 95 % band."""
+        return self.value - Z95 * self.std
+
+    @property
+    def upper(self) -> FloatArray:
+        """Upper end of the 95 % band."""
+        return self.value + Z95 * self.std
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """The torques of one shift on `time` (n,) [s].
+
+    `output_torque` is T_o of the shaft, `clutch_torque` goes by element and has the sign of its
+    slip where it slips (THEORY section 3). `notes` list missing inputs and cuts of the gears before
+    and after the shift.
+    """
+
+    shift: Shift
+    time: FloatArray
+    output_torque: Band
+    clutch_torque: Mapping[str, Band]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def bands(self) -> dict[str, Band]:
+        """Torques by the name of their channel: `output_torque`, `torque.<element>`."""
+        clutches = {f"torque.{name}": band for name, band in self.clutch_torque.items()}
+        return {"output_torque": self.output_torque, **clutches}
+
 
 BoolArray = NDArray[np.bool_]
 

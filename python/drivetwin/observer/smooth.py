@@ -38,12 +38,14 @@ from drivetwin.observer.linear_model import (
     SPEEDS,
     STATES,
     TORQUE_ERROR,
+    Band,
     BoolArray,
+    FloatArray,
     Linear,
+    Observation,
     build_linear_model,
     compute_impulse_response,
 )
-from drivetwin.observer.result import Band, FloatArray, Observation
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from drivetwin._util.display_units import NM
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.observer.result import Band, FloatArray, Observation
+from drivetwin.observer.linear_model import Band, FloatArray, Observation
 from drivetwin.report.blocks import Block, FigureBlock, Page, Section, make_notes, make_table
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.style import MEASURED, SIMULATED

@@ -228,7 +228,7 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
         if name == "J_e" and self.tie is not None:
             ratio = self.place_element(point, self.tie.element).ratio
             return self.tie.inertia - self.get_value(point, "J_out") / ratio**2
-        free = self.get_unknown(name)
+        free = self.get_unknown(name) if self.log else name
         return point[free] if free in point.names else self.fixed[name]
 
     def get_final_drive(self, point: ParameterVector) -> float:

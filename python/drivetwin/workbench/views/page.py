@@ -13,7 +13,6 @@ from drivetwin.report.html import read_template
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.sessions import Sessions
-from drivetwin.workbench.steps import Step
 from drivetwin.workbench.views import (
     card,
     channels,
@@ -27,6 +26,7 @@ from drivetwin.workbench.views import (
 )
 from drivetwin.workbench.views.stepper import (
     TITLES,
+    Step,
     build_navigation,
     build_panel,
     register_states,

@@ -25,8 +25,7 @@ from drivetwin.logs.formats.can.database import (
 from drivetwin.logs.formats.code_texts import describe_faults
 from drivetwin.logs.formats.frames import FEW_EARLIER, MOST_EARLIER, Frames, Message, Signal
 from drivetwin.logs.formats.j1939 import torque
-from drivetwin.logs.formats.j1939.codes import check_codes
-from drivetwin.logs.formats.j1939.matching import GroupTable, get_group
+from drivetwin.logs.formats.j1939.matching import GroupTable, check_codes, get_group
 from drivetwin.logs.formats.j1939.transport import (
     ENGINE,
     REPEATED,

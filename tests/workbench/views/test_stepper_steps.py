@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from drivetwin import Method
-from drivetwin.workbench.steps import assess_steps
+from drivetwin.workbench.views.stepper import assess_steps
 from tests.workbench.conftest import CARD, LOG
 
 
