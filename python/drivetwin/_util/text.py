@@ -24,7 +24,7 @@ def escape_text(text: str, keep: str = "\n\t") -> str:
     Terminals and browsers obey control characters, escape sequences and bidirectional overrides.
     The characters in `keep` stay.
     """
-    if text.isprintable():
+    if text.isprintable() or text in keep:
         return text
     return "".join(
         _escape(one) if unicodedata.category(one) in _HIDDEN and one not in keep else one

@@ -115,7 +115,7 @@ def _iterate_excess(document: dict[str, Any]) -> Iterator[str]:
     waiting: list[tuple[Any, tuple[int | str, ...]]] = [(document, ())]
     while waiting:
         value, place = waiting.pop()
-        key = format_key_path(part if isinstance(part, int) else part[:40] for part in place)
+        key = format_key_path([part if isinstance(part, int) else part[:40] for part in place])
         if isinstance(value, (dict, list)):
             if len(place) >= MAX_DEPTH:
                 yield f"{key[:80]}...: nested deeper than {MAX_DEPTH} levels"
@@ -126,7 +126,8 @@ def _iterate_excess(document: dict[str, Any]) -> Iterator[str]:
             yield f"{key}: the integer exceeds 64 bits"
         elif isinstance(value, float) and is_extreme(value):
             yield f"{key}: {value:g} is beyond 1e{MAX_EXPONENT} or within 1e-{MAX_EXPONENT} of zero"
-        if any(isinstance(one, str) and len(one) > MAX_TEXT for one in (value, *place[-1:])):
+        texts = [one for one in (value, *place[-1:]) if isinstance(one, str)]
+        if texts and max(map(len, texts)) > MAX_TEXT:
             yield f"{key}: a text of more than {MAX_TEXT} characters"
 
 

@@ -39,7 +39,7 @@ from drivetwin.simulation.network import (
     to_core_sines,
 )
 from drivetwin.simulation.serialize import as_json, as_names, is_number, require_number
-from drivetwin.simulation.variable import Variable, iterate_variables, seed, seed_description
+from drivetwin.simulation.variable import Variable, list_variables, seed, seed_description
 
 LANES = _LANES
 """Unknowns that one pass of the core differentiates by: 16, or 8 in a build for demos."""
@@ -136,7 +136,7 @@ class NetworkTask:
         delays = [one.delay for one in self.inputs.values() if isinstance(one, Signal)]
         acting = np.zeros(count, dtype=bool)
         numbers = [self.elements, self.start.speeds, self.start.twists, delays]
-        for one in iterate_variables(numbers):
+        for one in list_variables(numbers):
             acting |= one.slopes != 0.0
         return np.flatnonzero(acting).tolist()
 

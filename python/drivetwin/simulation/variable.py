@@ -8,7 +8,7 @@ the weights of its derivatives.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -101,26 +101,36 @@ def seed(number: float, lanes: Sequence[int]) -> Seeded:
     return float(number), [(lane, one) for lane, one in enumerate(slopes) if one != 0.0]
 
 
+_SEEDED = Variable | dict | list | tuple
+"""Values of a description that may contain a variable."""
+
+
 def seed_description(description: Any, lanes: Sequence[int]) -> Any:
     """Return a description of mappings and lists in which each number carries its seeds."""
     if isinstance(description, Variable):
         value, seeds = seed(description, lanes)
         return {"value": value, "seeds": seeds} if seeds else value
     if isinstance(description, dict):
-        return {key: seed_description(value, lanes) for key, value in description.items()}
+        return dict(zip(description, seed_description([*description.values()], lanes), strict=True))
     if isinstance(description, list | tuple):
-        return [seed_description(value, lanes) for value in description]
+        return [
+            seed_description(value, lanes) if isinstance(value, _SEEDED) else value
+            for value in description
+        ]
     return description
 
 
-def iterate_variables(description: Any) -> Iterator[Variable]:
-    """Yield the variables of a description of mappings and lists."""
-    if isinstance(description, Variable):
-        yield description
-    elif isinstance(description, dict | list | tuple):
-        entries = description.values() if isinstance(description, dict) else description
-        for one in entries:
-            yield from iterate_variables(one)
+def list_variables(description: Any) -> list[Variable]:
+    """List the variables of a description of mappings and lists."""
+    found: list[Variable] = []
+    waiting = [description]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, Variable):
+            found.append(one)
+        elif isinstance(one, dict | list | tuple):
+            waiting += one.values() if isinstance(one, dict) else one
+    return found
 
 
 def sign(number: float) -> float:

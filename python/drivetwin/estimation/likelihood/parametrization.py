@@ -252,10 +252,10 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
     def get_law(self, point: ParameterVector, element: str) -> tuple[float, float, float, float]:
         """Return the coefficients `LAW` of the friction law of an element at `point`."""
         partner = self.partners.get(element, element)
-        c, drop, v, ln_v_s = (self.get_value(point, f"{partner}.{key}") for key in LAW)
+        c, drop, v, ln_v_s = [self.get_value(point, f"{partner}.{key}") for key in LAW]
         if partner == element:
             return c, drop, v, ln_v_s
-        level, rest = (self.get_value(point, f"{element}.{key}") for key in FOLLOWER)
+        level, rest = [self.get_value(point, f"{element}.{key}") for key in FOLLOWER]
         return level * c, level * drop + rest, level * v, ln_v_s
 
     def get_unknown(self, name: str) -> str:
