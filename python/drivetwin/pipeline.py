@@ -21,7 +21,7 @@ from drivetwin.estimation.data.actuators import (
 )
 from drivetwin.estimation.data.prepare import prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
-from drivetwin.estimation.direct.output_torque_delay import align_output_torque
+from drivetwin.estimation.direct.momentum_balance import align_output_torque
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.identify import identify as identify_prepared
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method

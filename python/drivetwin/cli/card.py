@@ -72,7 +72,7 @@ def _compare(
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None]:
     """Check a card with its log; return the findings, and the error of a log that is unusable."""
     from drivetwin.estimation.data.prepare import prepare_shift
-    from drivetwin.estimation.result.ratio_check import compare_ratios
+    from drivetwin.estimation.result.prior_conflict import compare_ratios
     from drivetwin.logs.quality.time_alignment import estimate_final_drive
     from drivetwin.logs.read import read_log
     from drivetwin.plausibility.check import check_card, merge_ratios, select_card_findings

@@ -139,7 +139,7 @@ class _SpeedResults(NamedTuple):
 def _estimate_from_speeds(
     log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
 ) -> _SpeedResults:
-    from drivetwin.estimation.data.prepare_gears import prepare_gears, prepare_input_speed
+    from drivetwin.estimation.data.segments import prepare_gears, prepare_input_speed
     from drivetwin.estimation.direct.inertia_in_gear import estimate_gear_inertias
     from drivetwin.estimation.direct.resonance import find_shift_resonance
 

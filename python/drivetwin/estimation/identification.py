@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from drivetwin.estimation.likelihood.fit import LikelihoodFit
     from drivetwin.estimation.paper.pipeline import PaperShift
     from drivetwin.estimation.result.cause import Cause, PredictedSpread
-    from drivetwin.estimation.result.suggestion import CardNumber, ExperimentRanking
+    from drivetwin.estimation.result.estimate import CardNumber, ExperimentRanking
     from drivetwin.estimation.result.validation import HeldOut, Validation
 
 OIL_TEMPERATURE = "oil_temperature"

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from drivetwin._util.plain_values import format_json
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.analysis.profile_likelihood import Profile
-from drivetwin.estimation.result.suggestion import ExperimentRanking
+from drivetwin.estimation.result.estimate import ExperimentRanking
 from drivetwin.files.records import FrictionRecord, SuggestionRecord
 from drivetwin.fit.examine import REPEATS, Improvement
 

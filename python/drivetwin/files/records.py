@@ -32,11 +32,14 @@ from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.errors import ResultFileError, Where
-from drivetwin.estimation.result.estimate import OF_RATIO, Estimate, FrictionCurve, Verdict
-from drivetwin.estimation.result.suggestion import (
+from drivetwin.estimation.result.estimate import (
+    OF_RATIO,
     CardNumber,
+    Estimate,
     Experiment,
     ExperimentRanking,
+    FrictionCurve,
+    Verdict,
 )
 from drivetwin.findings import Code, Finding, Number, Row, Severity, list_fields
 from drivetwin.parameters import get_parameter_spec

@@ -17,8 +17,8 @@ from drivetwin.estimation.likelihood.diagnostics.identifiability import report_n
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
     check_weighting,
+    find_order,
 )
-from drivetwin.estimation.likelihood.diagnostics.shaft_orders import find_order
 from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.likelihood.optimize.search import RefinedStart
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult

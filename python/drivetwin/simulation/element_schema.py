@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from enum import StrEnum
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -232,7 +233,7 @@ def _matches(value: Any, kind: FieldKind) -> bool:
         case FieldKind.FLAG:
             return isinstance(value, bool | np.bool_)
         case FieldKind.NUMBER:
-            return is_number(value)
+            return (isinstance(value, float) and isfinite(value)) or is_number(value)
         case FieldKind.NUMBERS:
             return _is_list(value) and all(map(is_number, value))
         case _:

@@ -101,7 +101,7 @@ def seed(number: float, lanes: Sequence[int]) -> Seeded:
     return float(number), [(lane, one) for lane, one in enumerate(slopes) if one != 0.0]
 
 
-_SEEDED = Variable | dict | list | tuple
+_SEEDED = (Variable, dict, list, tuple)
 """Values of a description that may contain a variable."""
 
 

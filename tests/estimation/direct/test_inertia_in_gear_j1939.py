@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.estimation.data.prepare_gears import prepare_gears, prepare_input_speed
+from drivetwin.estimation.data.segments import prepare_gears, prepare_input_speed
 from drivetwin.estimation.direct.inertia_in_gear import estimate_gear_inertias
 from drivetwin.estimation.direct.resonance import Resonance, find_shift_resonance
 from drivetwin.estimation.result.estimate import Verdict

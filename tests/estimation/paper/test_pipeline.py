@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.direct.window_means import compute_window_edges
+from drivetwin.estimation.direct.load_balance import compute_window_edges
 from drivetwin.estimation.paper.pipeline import ETA_GRID, identify_paper_shift
 from drivetwin.estimation.paper.wlse import Weighting, fit_weighted_inertia
 from drivetwin.findings import Code

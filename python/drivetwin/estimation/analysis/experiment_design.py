@@ -42,16 +42,18 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     make_log_id,
 )
 from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
-from drivetwin.estimation.result.method import Method
-from drivetwin.estimation.result.suggestion import (
+from drivetwin.estimation.result.estimate import (
     FIRMER,
     SOFTER,
     TORQUE_LEVEL,
+    Z95,
+    Estimate,
     ExpectedPrecision,
     Experiment,
     ExperimentRanking,
+    Verdict,
 )
+from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.verdict import VERDICT, assess, is_limited
 from drivetwin.findings import Code, explain
 from drivetwin.parameters import get_parameter_spec

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""η, Je and Jo′ from the momentum balance through gear, inertia phase and next gear.
+"""η, Je, Jo′ and the delay of the output torque from momentum balances.
 
 In gear g (eq. 10) and, with the output side's torque put in for the slipping element, in the
 inertia phase of the shift to h:
@@ -16,15 +16,21 @@ their design priors; Jo′ has one too. The delay of the engine torque is estima
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.noise import estimate_quantization_error
-from drivetwin.estimation.data.segments import MomentumSettings, Segment, find_segments
-from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
+from drivetwin.estimation.data.segments import MOMENTUM, MomentumSettings, Segment, find_segments
+from drivetwin.estimation.data.shift_data import (
+    KnownDriveline,
+    PreparedLog,
+    ShiftData,
+    ShiftSignals,
+)
 from drivetwin.estimation.regression.errors_in_variables import (
     Fit,
     Prior,
@@ -39,7 +45,64 @@ from drivetwin.estimation.regression.modulating_functions import (
     build_hann_kernels,
     join_windows,
 )
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.findings import Code, Number, report
+from drivetwin.vehicle.effects import EffectId
+from drivetwin.vehicle.spec import PriorValue, compute_middle
+
+FOUND = (Code.TORQUE_CLOCK_LATE, Code.TORQUE_LATE_OR_SLIP)
+"""Findings of the log check on a delay between output torque and speeds."""
+PARTS = 6
+"""Parts of the found delay at whose ends the balance is computed [count]: those of 30 ms are
+shorter than twice the usual delay that the effect allows."""
+
+
+def align_output_torque(log: PreparedLog) -> PreparedLog:
+    """Return the log with the output torque at the stamps that its momentum balance supports.
+
+    The log is returned as it is without a delay that its check has found, where the card states
+    the delay, and where the balance hardly improves.
+    """
+    found = [one for one in log.findings if one.code in FOUND]
+    late = [one for one in found if one.names["role"] == "output_torque"]
+    if not late or EffectId.OUTPUT_TORQUE_DELAY in log.design.effects:
+        return log
+    shifts = np.linspace(0.0, late[0].numbers["shift"].value, PARTS + 1)
+    try:
+        powers = np.array([_compute_power(log, float(shift)) for shift in shifts])
+    except IdentificationError:
+        return log
+    if powers[0] - powers.min() < DELAY.min_rise:
+        return log
+    best = interpolate_parabola_minimum(shifts, powers)
+    moved = report(
+        Code.OUTPUT_TORQUE_ALIGNED,
+        "",
+        late[0].place,
+        shift=Number(best, "s"),
+        found=late[0].numbers["shift"],
+    )
+    return replace(
+        log,
+        shifts=tuple(_move(one, best) for one in log.shifts),
+        findings=(*log.findings, moved),
+    )
+
+
+def _compute_power(log: PreparedLog, shift: float) -> float:
+    """Compute Q of the momentum balance over all shifts with the output torque moved by `shift`
+    [s]."""
+    start = compute_middle(log.design.J_prime_range)
+    moved = [_move(one, shift) for one in log.shifts]
+    fits = [estimate_momentum_inertia(one.signals, one.driveline, MOMENTUM, start) for one in moved]
+    return sum(one.fit.q for one in fits)
+
+
+def _move(one: ShiftData, shift: float) -> ShiftData:
+    """Move the output torque of a shift by `shift` [s]."""
+    torque = one.signals.output_torque
+    moved = replace(torque, time=torque.time + shift)
+    signals = replace(one.signals, output_torque=moved, output_torque_shift=shift)
+    return replace(one, signals=signals)
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,8 @@ from drivetwin.estimation.likelihood.diagnostics.identifiability import (
 from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
     check_residuals,
     check_weighting,
+    find_order,
 )
-from drivetwin.estimation.likelihood.diagnostics.shaft_orders import find_order
 from drivetwin.estimation.likelihood.effects.causes import (
     compute_doubt,
     describe_cause,

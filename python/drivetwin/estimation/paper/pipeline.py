@@ -20,17 +20,17 @@ from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.signal_processing import compute_moving_mean
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.direct.load_balance import (
+    compute_window_edges,
+    compute_window_means,
+    drop_nan_rows,
+)
 from drivetwin.estimation.direct.ringdown import (
     RING_DOWN,
     RingDown,
     compute_shaft_parameters,
     refuse_ringdown,
     select_ring_samples,
-)
-from drivetwin.estimation.direct.window_means import (
-    compute_window_edges,
-    compute_window_means,
-    drop_nan_rows,
 )
 from drivetwin.estimation.paper.wlse import (
     GridFit,

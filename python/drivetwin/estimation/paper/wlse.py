@@ -14,7 +14,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.direct.window_means import WINDOW
+from drivetwin.estimation.direct.load_balance import WINDOW
 
 
 @dataclass(frozen=True)

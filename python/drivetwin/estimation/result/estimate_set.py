@@ -12,8 +12,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.result.cause import Cause, PredictedSpread
-from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw
-from drivetwin.estimation.result.suggestion import CardNumber
+from drivetwin.estimation.result.estimate import Z95, CardNumber, Estimate, FrictionCurve, LoadLaw
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import make_shift_labels
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Design values and ranges of the card as priors: their use, removal and conflict with the log.
+"""Design values and ranges of the card as priors: use, removal, conflict with log and ratios.
 
 A design value is one additional measurement. If the log contradicts it, the estimate lies between
 the two and may match neither: a warning is issued, and the parameters that depend on it do not
@@ -19,7 +19,8 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline
+from drivetwin.estimation.data.prepare import measure_ratios
+from drivetwin.estimation.data.shift_data import DesignData, KnownDriveline, ShiftData
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.verdict import (
     assess,
@@ -29,6 +30,7 @@ from drivetwin.estimation.result.verdict import (
 )
 from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.parameters import (
+    FINAL_DRIVE,
     OVER_ETA,
     describe_ratio_id,
     get_parameter_spec,
@@ -36,6 +38,38 @@ from drivetwin.parameters import (
 )
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.spec import PriorValue
+
+METHOD = "speeds"
+"""Method of a ratio that is no result of a fit."""
+
+
+def compare_ratios(shifts: Sequence[ShiftData], final_drive: PriorValue | None) -> list[Finding]:
+    """Report each ratio on the card that the speeds of the log know better.
+
+    The findings are those of an identification by the likelihood. Ratios of gears are those of mean
+    speeds, averaged over the shifts by their precision. `final_drive` is that of the log: the mean
+    speeds of a shift contain the twist of the shaft.
+    """
+    priors: dict[str, PriorValue] = {}
+    measured: dict[str, list[PriorValue]] = {}
+    for shift in shifts:
+        priors |= shift.driveline.ratio_priors
+        for name, one in measure_ratios(shift.signals, shift.driveline).items():
+            measured.setdefault(name, []).append(one)
+    measured.pop(FINAL_DRIVE, None)
+    if final_drive is not None:
+        measured[FINAL_DRIVE] = [final_drive]
+    estimates = {name: _average(name, values) for name, values in measured.items()}
+    return report_refined(priors, estimates)
+
+
+def _average(name: str, values: Sequence[PriorValue]) -> Estimate:
+    """Average independent values of one ratio by their precision."""
+    value, std = np.array([(one.value, one.std) for one in values]).T
+    weights = std**-2.0 if np.all(std > 0.0) else np.ones(len(values))
+    mean = float(np.average(value, weights=weights))
+    spread = float(np.sum(weights) ** -0.5) if np.all(std > 0.0) else 0.0
+    return Estimate(name, mean, spread, Verdict.IDENTIFIED, METHOD)
 
 
 @dataclass(frozen=True)

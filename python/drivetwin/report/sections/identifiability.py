@@ -11,8 +11,13 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_significant, get_display_unit
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.estimate import Estimate, Verdict
-from drivetwin.estimation.result.suggestion import CardNumber, CardNumberKind, ExperimentRanking
+from drivetwin.estimation.result.estimate import (
+    CardNumber,
+    CardNumberKind,
+    Estimate,
+    ExperimentRanking,
+    Verdict,
+)
 from drivetwin.estimation.result.verdict import get_advice
 from drivetwin.findings import Code
 from drivetwin.report.blocks import (

@@ -29,12 +29,16 @@ from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
     ShiftSignals,
 )
-from drivetwin.estimation.direct.friction_law import LOG_V, MU_C, MU_DROP, MU_V
-from drivetwin.estimation.direct.friction_points import estimate_friction_law
-from drivetwin.estimation.direct.load_balance import estimate_load
+from drivetwin.estimation.direct.friction_law import (
+    LOG_V,
+    MU_C,
+    MU_DROP,
+    MU_V,
+    estimate_friction_law,
+)
+from drivetwin.estimation.direct.load_balance import drop_nan_rows, estimate_load
 from drivetwin.estimation.direct.momentum_balance import estimate_momentum_inertia
 from drivetwin.estimation.direct.ringdown import compute_shaft_parameters, estimate_pencil_start
-from drivetwin.estimation.direct.window_means import drop_nan_rows
 from drivetwin.estimation.likelihood.parametrization import LAW, build_load_deviations
 from drivetwin.vehicle.spec import compute_middle
 
