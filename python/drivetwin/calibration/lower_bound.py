@@ -25,7 +25,6 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
-from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
 
 _STEP = 0.01
 """Step of the program [s], a usual task of a controller; torques are straight lines in between."""
@@ -42,17 +41,15 @@ def compute_lower_bound(maneuver: Maneuver, limits: Sequence[Limit]) -> float | 
     Parameters
     ----------
     maneuver
-        The shift; its driveline has no elements beside the dual clutch.
+        The shift; elements beside its dual clutch are left out.
     limits
         Limits; those of shift time, torque intervention and torque rate take part.
 
     Returns
     -------
     float or None
-        The bound; None with added elements, and where no relaxed shift keeps the limits.
+        The bound; None where no relaxed shift keeps the limits.
     """
-    if maneuver.added != NO_ADDED_ELEMENTS:
-        return None
     bounds = {one.metric: one.bound for one in limits}
     time = maneuver.horizon - maneuver.request
     last = min(bounds.get(Metric.SHIFT_TIME, time), time)
@@ -76,22 +73,20 @@ def _solve(
     here, there = every[:-1], every[1:]
     stuck = [kron(every[chosen], slip[[k]]) for k, chosen in enumerate((before, after))]
     equal = vstack([kron(here, motion[:, :7]) + kron(there, motion[:, 7:]), *stuck])
-    goal = np.zeros(equal.shape[0])
-    goal[: 4 * (count - 1)] = np.tile(constant, count - 1)
-    rate = kron(there - here, np.eye(7)[[_ENGINE]] / _STEP)
-    peaks = kron(there - here, jerk[None])
-    rows = vstack([peaks, -peaks, rate, -rate, kron(every, np.diag([side, -side]) @ slip)])
+    goal = np.append(np.tile(constant, count - 1), np.zeros(equal.shape[0] - 4 * (count - 1)))
+    change = kron(there - here, np.stack([jerk, np.eye(7)[_ENGINE] / _STEP]))
+    rows = vstack([change, -change, kron(every, np.diag([side, -side]) @ slip)])
     highest = np.zeros((rows.shape[0], 2))
-    highest[: 2 * (count - 1), 1] = -1.0
-    highest[2 * (count - 1) : 4 * (count - 1), 0] = bounds.get(Metric.TORQUE_RATE, 1e9)
+    highest[: 4 * (count - 1)] = np.tile(
+        [[0.0, -1.0], [bounds.get(Metric.TORQUE_RATE, 1e9), 0.0]], (2 * (count - 1), 1)
+    )
     free = np.tile([-np.inf, np.inf], (count, 7, 1))
     demand, start = maneuver.point.engine_torque, maneuver.build_start()
     depth = bounds.get(Metric.TORQUE_REDUCTION, np.inf)
     free[:, _ENGINE] = sorted([demand, demand + maneuver.direction * depth])
     free[[0, -1], _ENGINE] = demand
-    spring = maneuver.model.k_o * start.twist
-    first = start.engine_speed, start.output_speed, start.wheel_speed, spring
-    free[0, :4] = np.array(first)[:, None]
+    speeds = start.engine_speed, start.output_speed, start.wheel_speed
+    free[0, :4] = np.array([*speeds, maneuver.model.k_o * start.twist])[:, None]
     for place, sign, slips in ((_OFF, -side, ~before), (_ON, side, ~after)):
         free[slips, place, int(sign < 0.0)] = 0.0
     # Any: the types of `linprog` lack the sparse arrays that it takes.
@@ -100,7 +95,7 @@ def _solve(
         hstack([equal, csr_array((equal.shape[0], 1))]),
     )
     box: Any = np.append(free.reshape(-1, 2), [[0.0, np.inf]], axis=0)
-    cost = np.append(np.zeros(7 * count), 1.0)
+    cost = np.eye(1, 7 * count + 1, 7 * count)[0]
     solved = linprog(cost, matrices[0], highest[:, 0], matrices[1], goal, box)
     return None if solved.fun is None else float(solved.fun)
 

@@ -106,7 +106,8 @@ def draw_scenarios(
     def make() -> Driveline | None:
         source = next(sources, random)
         unit = draw.driveline(source)
-        return None if unit is None else _keep_possible(unit(source))
+        made = None if unit is None else unit(source)
+        return made if made is not None and is_possible(made.model) else None
 
     drawn = collect_scenarios(maneuver, _repeat(make, count))
     if draw.actuators is None:
@@ -142,8 +143,8 @@ def _make_units(
     if unit is None:
         return None
     same = np.random.default_rng([seed, int(Purpose.PROMISE), 2])
-    made = [_keep_possible(unit(same)) for _ in range(count)]
-    return [one for one in made if one is not None] if None not in made else None
+    made = [unit(same) for _ in range(count)]
+    return made if all(is_possible(one.model) for one in made) else None
 
 
 def _repeat(make: Callable[[], _T | None], count: int) -> list[_T]:
@@ -162,10 +163,6 @@ def _repeat(make: Callable[[], _T | None], count: int) -> list[_T]:
             "of the twin reach impossible values",
         )
     return found
-
-
-def _keep_possible(one: Driveline) -> Driveline | None:
-    return one if is_possible(one.model) else None
 
 
 def collect_scenarios(maneuver: Maneuver, drivelines: Sequence[Driveline]) -> Scenarios:
