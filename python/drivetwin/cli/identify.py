@@ -56,10 +56,12 @@ def identify(request: Identify) -> Iterator[Outcome]:
     --hold-out names others.
     """
     from drivetwin.cli.identify_run import identify_log
-    from drivetwin.cli.identify_tcu import identify_controller_logs, is_of_controller
+    from drivetwin.tcu.card import is_controller_card
 
-    if is_of_controller(request):
-        yield identify_controller_logs(request)
+    if request.vehicle is not None and is_controller_card(request.vehicle):
+        from drivetwin.cli.identify_tcu import identify_controller_logs
+
+        yield identify_controller_logs(request, request.vehicle)
         return
     logs, how = request.logs, request.options
     if _is_bus(request):

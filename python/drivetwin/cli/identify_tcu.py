@@ -17,14 +17,7 @@ if TYPE_CHECKING:
     from drivetwin.tcu.outcome import TcuIdentification
 
 
-def is_of_controller(request: Identify) -> bool:
-    """Return True if the card is one for the log of a gearbox control."""
-    from drivetwin.tcu.card import is_controller_card
-
-    return request.vehicle is not None and is_controller_card(request.vehicle)
-
-
-def identify_controller_logs(request: Identify) -> Outcome:
+def identify_controller_logs(request: Identify, vehicle: Path) -> Outcome:
     """Identify the plant from all logs of one vehicle.
 
     Raises InputError for options of other logs, and the typed errors of reader and fit.
@@ -36,8 +29,7 @@ def identify_controller_logs(request: Identify) -> Outcome:
 
     unused = ("bus", "quick", "effects")
     request.refuse_stated(unused, "the log of a gearbox control has one method")
-    assert request.vehicle is not None
-    card, held = load_controller_card(request.vehicle), _read_numbers(request.hold_out)
+    card, held = load_controller_card(vehicle), _read_numbers(request.hold_out)
     with show_step(f"identifying {len(request.logs)} logs of a gearbox control"):
         found = identify_controller(request.logs, card, request.channels, held)
     file = build_tcu_file(found, request.describe_settings())

@@ -8,8 +8,12 @@ import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.direct.load_balance import compute_window_edges
-from drivetwin.estimation.paper.pipeline import ETA_GRID, identify_paper_shift
-from drivetwin.estimation.paper.wlse import Weighting, fit_weighted_inertia
+from drivetwin.estimation.paper.pipeline import (
+    ETA_GRID,
+    Weighting,
+    fit_weighted_inertia,
+    identify_paper_shift,
+)
 from drivetwin.findings import Code
 from tests.estimation.synthetic import Run, Truth
 

@@ -22,7 +22,7 @@ from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.findings import Code, Finding, Number, report
-from drivetwin.logs.quality.jumps import check_jumps, find_lost_messages
+from drivetwin.logs.quality.consistency_checks import check_jumps, find_lost_messages
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,

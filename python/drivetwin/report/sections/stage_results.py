@@ -12,8 +12,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import NM
 from drivetwin.estimation.direct.ringdown import RingDown
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.paper.pipeline import PaperShift
-from drivetwin.estimation.paper.wlse import GridFit
+from drivetwin.estimation.paper.pipeline import GridFit, PaperShift
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
 from drivetwin.report.blocks import (
