@@ -214,10 +214,9 @@ ADDED_ELEMENT_IDS = tuple(dict.fromkeys(name for ids in ADDED_ELEMENTS.values() 
 
 def select_added_elements(values: Mapping[str, float]) -> dict[str, float]:
     """Return the parameters by id of the elements all of whose parameters are in `values`."""
-    complete = [ids for ids in ADDED_ELEMENTS.values() if all(name in values for name in ids)]
-    return {
-        name: values[name] for name in ADDED_ELEMENT_IDS if any(name in ids for ids in complete)
-    }
+    complete = [ids for ids in ADDED_ELEMENTS.values() if values.keys() >= set(ids)]
+    chosen = set().union(*complete)
+    return {name: values[name] for name in ADDED_ELEMENT_IDS if name in chosen}
 
 
 def build_added_elements(values: Mapping[str, float], model: DualClutch) -> AddedElements:
