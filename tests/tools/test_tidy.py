@@ -179,7 +179,7 @@ def test_private_words_are_found_as_files_folders_and_definitions() -> None:
         "# comment\n"
         "python/drivetwin/*\tfolder\tapp\n"
         "python/drivetwin/logs/*\tfile\theld damage\n"
-        "python/drivetwin/logs/*\tpython\ttold Work ENOUGH\n"
+        "python/drivetwin/logs/*\tpython\treported Work ENOUGH\n"
         "crates/*\trust\tsprint Stuck\n"
     )
     files = {
