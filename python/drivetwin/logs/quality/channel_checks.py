@@ -79,8 +79,9 @@ WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 WRAP_STEP = 15e-3
 """Sample interval [s] from which output torque may do so: it falls in a quarter period."""
 
-WRAP_BESIDE, WRAP_DRIFT = 5, 0.02
-"""So many samples before and after an overflow move against the jump by this share at least."""
+WRAP_BESIDE, WRAP_DRIFT, WRAP_STEPS = 5, 0.02, 3.0
+"""So many samples before and after an overflow move against the jump by this share of the range at
+least, and by so many usual steps: a ramp moves by five, noise by less than three."""
 
 _PLAUSIBLE: dict[Quantity, tuple[float, float]] = {
     Quantity.PRESSURE: (1e-3 * BAR, 100 * BAR),
@@ -412,15 +413,13 @@ def _check_wraps(channel: Channel, where: Where) -> None:
     if channel.role == "output_torque" and channel.step > WRAP_STEP:
         return
     values, span = channel.values, float(np.ptp(channel.values))
-    near = WRAP_BESIDE
-    jumps = find_large_steps(
-        values, max(WRAP_SHARE * span, WRAP_CONTRAST * compute_usual_step(values))
-    )
+    near, usual = WRAP_BESIDE, compute_usual_step(values)
+    least = max(WRAP_DRIFT * span, WRAP_STEPS * usual)
+    jumps = find_large_steps(values, max(WRAP_SHARE * span, WRAP_CONTRAST * usual))
     for index in jumps[(jumps >= near) & (jumps < values.size - near - 1)]:
         jump = float(values[index + 1] - values[index])
         came = float(values[index] - values[index - near])
         went = float(values[index + 1 + near] - values[index + 1])
-        least = WRAP_DRIFT * span
         if min(-np.sign(jump) * came, -np.sign(jump) * went) > least:
             last, first = (
                 format_with_unit(float(values[k]), channel.quantity.unit)
