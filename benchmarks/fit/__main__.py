@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Accuracy and cost of `Model.fit` on six drivelines.
+"""Accuracy and cost of `Model.fit` on nine drivelines.
 
     python -m benchmarks.fit [--problem NAME] [--count N] [--seed SEED] [--workers N]
-                             [--mismatch] [--bounds] [--peers] [--coupled] [--paper]
+                             [--rate HZ] [--mismatch] [--bounds] [--peers] [--coupled] [--paper]
 
 Each realisation has noise on outputs and measured inputs, and priors of 30 % whose means are drawn
 about the truth; the search starts at these means. A minimum is right if its cost is at most 10
@@ -41,6 +41,7 @@ def main() -> int:
     parser.add_argument(
         "--mismatch", action="store_true", help="draw the errors of all fixed numbers"
     )
+    parser.add_argument("--rate", type=float, help="rate of noisier and rounded channels [Hz]")
     parser.add_argument("--bounds", action="store_true", help="bounds alone, without fits")
     parser.add_argument("--peers", action="store_true", help="compare other programs")
     parser.add_argument("--coupled", action="store_true", help="CoupledClutches alone")
@@ -76,11 +77,17 @@ def _run_study(given: argparse.Namespace) -> None:
 
     found = {}
     for name in given.problem:
-        problem = build_problem(name)
+        problem = build_problem(name, given.rate)
         bound = compute_bound(problem)
         seeds = range(given.seed, given.seed + given.count)
-        known = {"sigmas_known": not given.estimate_noise, "mismatch": given.mismatch}
-        tries = run_study(name, seeds, given.workers, **known)
+        tries = run_study(
+            name,
+            seeds,
+            given.workers,
+            sigmas_known=not given.estimate_noise,
+            mismatch=given.mismatch,
+            rate=given.rate,
+        )
         found[name] = summarise(tries, bound.std)
         _print(format_problem(problem, bound, found[name]))
     _print(format_summary(found))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Problems with one engagement: K0 of a hybrid, launch, converter lock-up; and a tip-in."""
+"""Problems with an engagement: K0 of a hybrid, launches, dual clutch, lock-up; and a tip-in."""
 
 from __future__ import annotations
 
@@ -118,12 +118,18 @@ def build_launch() -> Problem:
 
 
 def _assemble_launch(values: Values, start: Values) -> Model:
-    model = Model("dual-clutch launch")
-    model.torque("Te", "engine", 0.0)
-    model.inertia("Je", values["Je"], "engine")
     law = Stribeck(values["mu_c"], values["mu_s"], 15.0, 0.0)
     first = Plates(law, gain=0.01, p0=values["p0"])
     second = Plates(Stribeck(0.11, 0.13, 15.0, 0.0), gain=0.01, p0=0.8e5)
+    model = _build_dual_clutch(values, first, second)
+    set_start(model, start, ("engine", "wheel", "axle"), ("half shafts",), locked=["load"])
+    return model
+
+
+def _build_dual_clutch(values: Values, first: Plates, second: Plates) -> Model:
+    model = Model("dual-clutch gearbox")
+    model.torque("Te", "engine", 0.0)
+    model.inertia("Je", values["Je"], "engine")
     model.clutch("K1", "engine", "shaft 1", pressure=0.0, plates=first)
     model.clutch("K2", "engine", "shaft 2", pressure=0.0, plates=second)
     model.inertia("J shaft 1", values["J_in"], "shaft 1")
@@ -134,6 +140,104 @@ def _assemble_launch(values: Values, start: Values) -> Model:
     model.spring_damper("half shafts", "axle", "wheel", stiffness=values["k"], damping=values["c"])
     model.inertia("Jv", values["Jv"], "wheel")
     model.road_load("load", "wheel", rolling=values["rolling"], aero=0.03)
+    return model
+
+
+def build_dual_clutch() -> Problem:
+    """Return the shift 1-2 of a dual-clutch gearbox, the delays of both pressures unknown."""
+    time = make_grid(2.5, 1000.0)
+    base = build_launch()
+    shared = {
+        key: tuple(f"{one}.friction.{key}" for one in ("K1", "K2")) for key in ("mu_c", "mu_s")
+    }
+    unknowns = {
+        **base.unknowns,
+        **{key: Sought(base.unknowns[key].truth, paths) for key, paths in shared.items()},
+        "p0": Sought(0.8e5, ("K2.p0",)),
+        "late 1": Sought(0.02, ("delay.K1",), 0.5),
+        "late 2": Sought(0.03, ("delay.K2",), 0.5),
+    }
+    del unknowns["J_in"]
+    return Problem(
+        name="dual clutch",
+        text="shift 1-2 of a dual-clutch gearbox with late pressures",
+        assemble=_assemble_dual_clutch,
+        unknowns=unknowns,
+        outputs=base.outputs,
+        inputs={
+            "Te": Source(interpolate(time, (0.2, 100.0), (0.4, 150.0), (1.8, 130.0)), 1.0),
+            "K1": Source(interpolate(time, (0.7, 6e5), (0.9, 1.5e5), (1.1, 0.4e5)), 1e3),
+            "K2": Source(
+                interpolate(time, (0.6, 0.6e5), (1.1, 2.3e5), (1.9, 2.7e5), (2.0, 6e5)), 1e3
+            ),
+        },
+        time=time,
+        start=lambda values: {
+            "axle": 320.0 / (3.9 * 3.8),
+            "wheel": 320.0 / (3.9 * 3.8),
+            "half shafts": 1400.0 / values["k"],
+        },
+    )
+
+
+def _assemble_dual_clutch(values: Values, start: Values) -> Model:
+    law = Stribeck(values["mu_c"], values["mu_s"], 15.0, 0.0)
+    model = _build_dual_clutch(
+        {**values, "J_in": 0.03},
+        Plates(law, gain=0.01, p0=0.8e5),
+        Plates(law, gain=0.01, p0=values["p0"]),
+    )
+    set_start(model, start, ("axle", "wheel"), ("half shafts",), locked=["K1"])
+    return model
+
+
+def build_truck_start() -> Problem:
+    """Return the start of a heavy truck with a dry clutch."""
+    time = make_grid(4.0, 200.0)
+    return Problem(
+        name="truck start",
+        text="start of a heavy truck",
+        assemble=_assemble_truck_start,
+        unknowns={
+            "Je": Sought(4.0, ("Je.inertia",)),
+            "mu_c": Sought(0.3, ("clutch.friction.mu_c",)),
+            "mu_s": Sought(0.33, ("clutch.friction.mu_s",)),
+            "p0": Sought(1.2e5, ("clutch.p0",)),
+            "k": Sought(9.0e4, ("half shafts.stiffness",)),
+            "c": Sought(600.0, ("half shafts.damping",)),
+            "Jv": Sought(9000.0, ("Jv.inertia",)),
+            "rolling": Sought(8000.0, ("load.rolling",)),
+            "late": Sought(0.04, ("delay.clutch",), 0.5),
+        },
+        outputs={
+            "engine_speed": Sensor(("speed", "engine"), 0.3),
+            "input_speed": Sensor(("speed", "input"), 0.2),
+            "wheel_speed": Sensor(("speed", "wheel"), 0.01),
+        },
+        inputs={
+            "Te": Source(interpolate(time, (0.2, 0.0), (1.0, 700.0), (3.0, 900.0)), 5.0),
+            "clutch": Source(
+                interpolate(time, (0.2, 0.8e5), (0.5, 1.5e5), (1.8, 4.2e5), (3.2, 8e5)), 1e3
+            ),
+        },
+        time=time,
+        start=lambda _: {"engine": 80.0, "axle": 0.0, "wheel": 0.0, "half shafts": 0.0},
+        known=frozenset({"axle", "wheel", "half shafts"}),
+    )
+
+
+def _assemble_truck_start(values: Values, start: Values) -> Model:
+    model = Model("truck start")
+    model.torque("Te", "engine", 0.0)
+    model.inertia("Je", values["Je"], "engine")
+    law = Stribeck(values["mu_c"], values["mu_s"], 15.0, 0.0)
+    plates = Plates(law, gain=0.01, p0=values["p0"])
+    model.clutch("clutch", "engine", "input", pressure=0.0, plates=plates)
+    model.inertia("J input", 0.4, "input")
+    model.gear("gear", "input", "axle", ratio=36.0)
+    model.spring_damper("half shafts", "axle", "wheel", stiffness=values["k"], damping=values["c"])
+    model.inertia("Jv", values["Jv"], "wheel")
+    model.road_load("load", "wheel", rolling=values["rolling"])
     set_start(model, start, ("engine", "wheel", "axle"), ("half shafts",), locked=["load"])
     return model
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from benchmarks.fit.problem import (
@@ -77,6 +79,13 @@ def build_planetary() -> Problem:
         time=time,
         start=_start,
     )
+
+
+def build_late_planetary() -> Problem:
+    """Return the shift 3-4 with an unknown delay of the pressure of the engaging element."""
+    base = build_planetary()
+    late = Sought(0.025, ("delay.D",), 0.5)
+    return replace(base, name="late planetary", unknowns={**base.unknowns, "late": late})
 
 
 def _start(values: Values) -> Values:

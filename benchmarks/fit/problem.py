@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.estimation.likelihood.data.recorded_data import hold_ends
 from drivetwin.fit.fixed_numbers import FixedNumber, list_fixed, make_plain
 from drivetwin.fit.places import Numbers, list_places
 from drivetwin.modeling.model import Model
@@ -20,6 +21,13 @@ from drivetwin.simulation.network import Output, Start
 
 SPREAD = 0.3
 """Standard deviation of a prior over the value."""
+
+DELAY = "delay."
+"""Begin of the path of the delay of an input."""
+LONGEST = 0.25
+"""Time by which a delayed input is recorded before and after the run [s]."""
+PRESSURE, ROUGH = 1e4, 1.5e3
+"""Value above which an input is a pressure, and the noise of a rough one [Pa]."""
 
 Values = Mapping[str, float]
 
@@ -83,6 +91,18 @@ class Problem:
     time: FloatArray
     start: Callable[[Values], Values]
     known: frozenset[str] = frozenset()
+    is_rounded: bool = False
+    """Whether channels are rounded to the standard deviation of their noise."""
+
+    @property
+    def delays(self) -> dict[str, str]:
+        """Unknowns by the input that they delay."""
+        return {
+            path.removeprefix(DELAY): name
+            for name, one in self.unknowns.items()
+            for path in one.paths
+            if path.startswith(DELAY)
+        }
 
     @property
     def truth(self) -> dict[str, float]:
@@ -128,6 +148,14 @@ class Problem:
         model = self.assemble(values, {**self.start(values), **(start or {})})
         model.inputs.update({name: one.signal for name, one in self.inputs.items()})
         model.inputs.update(inputs or {})
+        return self._delay_inputs(model, values)
+
+    def _delay_inputs(self, model: Model, values: Values) -> Model:
+        """Return the model with delayed inputs that reach beyond the run."""
+        for name, unknown in self.delays.items():
+            signal = model.inputs[name]
+            assert isinstance(signal, Signal)
+            model.inputs[name] = replace(hold_ends(signal, LONGEST), delay=values[unknown])
         return model
 
     def simulate(
@@ -183,6 +211,10 @@ def record(
         for name, one in problem.inputs.items()
     }
     noisy = clean + problem.sigmas[:, None] * rng.standard_normal(clean.shape)
+    if problem.is_rounded:
+        steps = {name: one.sigma for name, one in problem.inputs.items() if one.sigma}
+        inputs |= {name: _round(inputs[name], step) for name, step in steps.items()}
+        noisy = np.round(noisy / problem.sigmas[:, None]) * problem.sigmas[:, None]
     means = draw_means(problem, rng)
     start = dict(problem.start(means))
     for sensor in problem.outputs.values():
@@ -190,6 +222,21 @@ def record(
         if kind == "speed" and node in start and node not in problem.known:
             start[node] += sensor.sigma * float(rng.standard_normal())
     return Realisation(inputs, dict(zip(problem.outputs, noisy, strict=True)), means, start)
+
+
+def _round(signal: Signal, step: float) -> Signal:
+    return replace(signal, values=np.round(signal.values / step) * step)
+
+
+def roughen(problem: Problem, rate: float) -> Problem:
+    """Return a problem sampled at a `rate` [Hz], with noisier pressures and rounded channels."""
+    time = make_grid(float(problem.time[-1]), rate)
+    inputs = {}
+    for name, one in problem.inputs.items():
+        values = np.interp(time, one.signal.time, one.signal.values)
+        is_rough = one.sigma > 0.0 and float(np.max(values)) > PRESSURE
+        inputs[name] = Source(Signal(time, values), ROUGH if is_rough else one.sigma)
+    return replace(problem, time=time, inputs=inputs, is_rounded=True)
 
 
 def move_fixed(problem: Problem, model: Model, moves: FloatArray) -> None:
@@ -245,6 +292,8 @@ def make_grid(end: float, rate: float) -> FloatArray:
 
 def _is_positive(elements: Mapping[str, Mapping[str, object]], path: str) -> bool:
     """Return whether the field at a path accepts no negative number."""
+    if path.startswith(DELAY):
+        return False
     name, *keys = path.split(".")
     kind = str(elements[name]["type"])
     groups: tuple[Mapping[str, Field], ...] = (ELEMENT_FIELDS[kind],)

@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.fit.problem import (
+    LONGEST,
     Problem,
     Realisation,
     Values,
@@ -22,6 +23,7 @@ from benchmarks.fit.problem import (
 from benchmarks.fit.problems import build_problem
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import DrivetwinError
+from drivetwin.estimation.likelihood.data.recorded_data import hold_ends
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.result import ModelFit
@@ -74,6 +76,7 @@ def run_study(
     *,
     sigmas_known: bool = True,
     mismatch: bool = False,
+    rate: float | None = None,
 ) -> list[Try]:
     """Fit the realisations of `seeds` of a problem; the result is independent of `workers`.
 
@@ -89,22 +92,31 @@ def run_study(
         Whether the fit is given the noise of the outputs; otherwise it estimates it.
     mismatch
         Whether the errors of all fixed numbers are drawn from their distributions.
+    rate
+        Rate of rough channels [Hz]; None for those of the problem.
 
     Returns
     -------
     list of Try
         Outcomes in the order of the seeds.
     """
-    task = partial(fit_once, name, sigmas_known=sigmas_known, mismatch=mismatch)
+    task = partial(fit_once, name, sigmas_known=sigmas_known, mismatch=mismatch, rate=rate)
     if workers == 1:
         return [task(seed) for seed in seeds]
     with ProcessPoolExecutor(workers) as pool:
         return list(pool.map(task, seeds))
 
 
-def fit_once(name: str, seed: int, *, sigmas_known: bool = True, mismatch: bool = False) -> Try:
+def fit_once(
+    name: str,
+    seed: int,
+    *,
+    sigmas_known: bool = True,
+    mismatch: bool = False,
+    rate: float | None = None,
+) -> Try:
     """Draw the realisation of a seed, fit it, and fit it once more from the truth."""
-    problem = build_problem(name)
+    problem = build_problem(name, rate)
     drawn = draw(problem, seed, mismatch=mismatch)
     began = time.process_time()
     try:
@@ -184,7 +196,11 @@ def fit_model(
         tolerances = {one.name: Tolerance(exact=True) for one in model.components}
     else:
         move_fixed(problem, model, drawn.moves)
-    recording = Recording(drawn.inputs, outputs, known)
+    inputs = {
+        name: hold_ends(one, LONGEST) if name in problem.delays else one
+        for name, one in drawn.inputs.items()
+    }
+    recording = Recording(inputs, outputs, known)
     return model.fit([recording], unknowns, wanted, tolerances=tolerances, seed=0)
 
 
