@@ -127,7 +127,9 @@ class NetworkTask:
             for output, column in zip(self.outputs, slopes, strict=True):
                 derivatives[output][:, lanes] = column[:, : len(lanes)]
             if events:
-                event_times[:, lanes] = one.event_times[:, : len(lanes)]
+                # Chatter may end after another number of events beside other derivatives.
+                is_same = len(one.events) == len(events)
+                event_times[:, lanes] = one.event_times[:, : len(lanes)] if is_same else np.nan
         unknowns = tuple(str(k) for k in range(count))
         return NetworkSensitivities(run, unknowns, derivatives, event_times)
 

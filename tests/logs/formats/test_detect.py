@@ -54,7 +54,7 @@ READERS = {
     "mat5": _MAT,
     "mat73": Reader("mat.open_mat", "pymatreader", "io"),
     "parquet": Reader("parquet.open_parquet", "pyarrow.parquet", "io"),
-    "arrow": Reader("arrow.open_arrow", "pyarrow.ipc", "io"),
+    "parquet_arrow": Reader("parquet.open_arrow", "pyarrow.ipc", "io"),
     "blf": Reader("can.open.open_blf", "can", "can", bus=True, keeps=True),
     "candump": _TEXT,
     "candump-L": Reader(_TEXT.opener, bus=True, keeps=True, note="counts from the first stamp"),

@@ -76,6 +76,12 @@ def refine(
     return _select_best(_iterate_draws(problem, start), known) or known
 
 
+def is_doubtful(problem: DualClutchProblem, point: ParameterVector) -> bool:
+    """Return whether a minimum by the sensors' noise is one of a wrong model."""
+    cost = problem.update_weighting(point).cost(point)
+    return cost > MULTI_START.doubtful_chi2 * problem.size
+
+
 def find_near_point(problem: DualClutchProblem, start: ParameterVector) -> ParameterVector | None:
     """Find a minimum by the sensors' noise, a doubtful one by two draws; None where none is near
     the measurement."""
@@ -155,13 +161,17 @@ def _iterate_attempts(
 def _iterate_draws(
     problem: DualClutchProblem, start: ParameterVector
 ) -> Iterator[LikelihoodFit | None]:
-    """Yield the fit from each draw that leads lower than those before."""
+    """Yield the fit from each draw that leads near the measurement.
+
+    Raises NoConvergence where none does.
+    """
     attempts, tried = _begin_attempts(problem), list[ParameterVector]()
     for _ in refine_draws(attempts, start, compute_spread(problem, start)):
-        if attempts.chi2 < SEARCH.near_chi2 and not any(attempts.best.point is x for x in tried):
-            tried.append(attempts.best.point)
-            yield fit_local(problem, attempts.best.point)
-    if not tried:
+        for one in attempts.starts[len(tried) :]:
+            tried.append(one.point)
+            if one.cost < SEARCH.near_chi2 * problem.size:
+                yield fit_local(problem, one.point)
+    if not attempts.chi2 < SEARCH.near_chi2:
         raise NoConvergence(*_FAILED)
 
 

@@ -37,6 +37,7 @@ from drivetwin.estimation.likelihood.optimize.multistart import (
     compute_spread,
     fit_local,
     fit_multistart,
+    is_doubtful,
     refine,
 )
 from drivetwin.estimation.likelihood.optimize.search import find_best_draw
@@ -194,7 +195,7 @@ def fit_candidates(problem: DualClutchProblem, start: ParameterVector) -> Likeli
     Raises IdentificationError where it does not converge with the likeliest modes.
     """
     near, likely, other = select_sampling_mode(problem, start)
-    draws = near is start
+    draws = near is start or not is_doubtful(problem, near)
     best = _try_fit(likely, near, draws) or fit_multistart(other, near, draws=draws)
     best = refit_best_mode(problem, best)
     if best.chi2 < MULTI_START.accept_chi2:
