@@ -86,6 +86,10 @@ def find_near_point(problem: DualClutchProblem, start: ParameterVector) -> Param
     """Find a minimum by the sensors' noise, a doubtful one by two draws; None where none is near
     the measurement."""
     attempts = _begin_attempts(problem)
+    if is_near(problem, start):
+        attempts.refine(start)
+    if attempts.chi2 < MULTI_START.doubtful_chi2:
+        return attempts.best.point
     for _ in refine_draws(attempts, start, compute_spread(problem, start)):
         if attempts.agreeing > 1 or attempts.chi2 < MULTI_START.doubtful_chi2:
             break
