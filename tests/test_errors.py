@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a fault lies is reported as exactly as it is known."""
+"""Errors state the place of a fault as exactly as it is known."""
 
 from __future__ import annotations
 

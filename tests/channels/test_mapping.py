@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which column is which role: guesses from names in use, ambiguity and absence."""
+"""Roles of columns: guesses from names in use, ambiguity and absence."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Truth:
         return self.mu_c + (self.mu_s - self.mu_c) * float(np.exp(-s / self.v_s)) + self.mu_v * s
 
     def driveline(self, J_out_std: float = 0.0, P0_std: float = 0.0) -> KnownDriveline:
-        """What the estimators are reported."""
+        """Return the known data of the driveline."""
         P0 = PriorValue(self.P0, P0_std)
         a = ShiftElementKinematics(
             "B2", 1.0 / (self.i_a - 1.0), self.i_a / (self.i_a - 1.0), self.gain_a, P0, "2"

@@ -31,8 +31,8 @@ from drivetwin.vehicle.spec import Z95
 CONTRADICTION = 0.01
 """Probability of a test of agreement below which shifts contradict each other, as between logs."""
 _LEAST_FREEDOM = 3.0
-"""Degrees of freedom of an interval below which one wrong shift looks like scatter. Of
-four shifts three may agree, so that it shows."""
+"""Degrees of freedom of an interval below which a wrong shift looks like scatter: of four shifts,
+with three degrees, the other three agree and show it."""
 _SMALLEST = 1e-12
 """Relative eigenvalue below which a direction carries no information."""
 

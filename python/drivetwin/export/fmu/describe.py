@@ -152,13 +152,15 @@ def _build_parameter(
 
 
 def _list_inputs(names: list[str], delays: InputDelays) -> list[Variable]:
-    def of(name: str, index: int, meaning: str, unit: str) -> Variable:
+    def make_input(name: str, index: int, meaning: str, unit: str) -> Variable:
         return Variable(name, INPUTS + index, Kind.REAL, Role.INPUT, meaning, unit, 0.0)
 
     pressure = ", ".join(filter(None, ("gauge pressure", delays.describe_pressure())))
     torque = ", ".join(filter(None, ("indicated less friction", delays.describe_torque())))
-    pressures = (of(f"{name}.pressure", i, pressure, "Pa") for i, name in enumerate(names, 1))
-    return [of("engine_torque", 0, torque, "N*m"), *pressures]
+    pressures = (
+        make_input(f"{name}.pressure", i, pressure, "Pa") for i, name in enumerate(names, 1)
+    )
+    return [make_input("engine_torque", 0, torque, "N*m"), *pressures]
 
 
 def _list_outputs(names: list[str], delays: InputDelays) -> list[Variable]:

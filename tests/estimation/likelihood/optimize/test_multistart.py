@@ -11,7 +11,11 @@ import pytest
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.optimize.multistart import fit_local, fit_multistart
+from drivetwin.estimation.likelihood.optimize.multistart import (
+    fit_local,
+    fit_multistart,
+    refine,
+)
 from tests.estimation.likelihood.fixtures import ROUGH, bench, fitted, problem, truth_of
 from tests.support.bench import Knowledge, record_bench
 
@@ -85,10 +89,12 @@ def test_a_minimum_is_one_over_unknowns_and_inputs_alike() -> None:
 
 
 def test_a_log_that_the_model_cannot_follow_is_refused() -> None:
+    """A fit that is known stays where no other start leads near."""
     made = bench()
     posed, start = problem(made)
     term = posed.terms[0]
     fixed = {**term.plant.fixed, "i_f": 1.3 * term.plant.driveline.i_f}
-    wrong = replace(term, plant=replace(term.plant, fixed=fixed))
+    wrong = replace(posed, terms=(replace(term, plant=replace(term.plant, fixed=fixed)),))
     with pytest.raises(IdentificationError, match="could not be brought onto the measurement"):
-        fit_multistart(replace(posed, terms=(wrong,)), start)
+        fit_multistart(wrong, start)
+    assert refine(fitted(), wrong, start) is fitted()

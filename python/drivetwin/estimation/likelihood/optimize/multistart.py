@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -155,28 +155,26 @@ def _iterate_attempts(
 ) -> Iterator[LikelihoodFit | None]:
     """Yield fits from `start`, if it is near, and from draws.
 
-    Raises NoConvergence where none of these is near the measurement.
+    Raises NoConvergence where no fit came of the start and no draw leads near the measurement.
     """
-    if is_near(problem, start):
-        yield fit_local(problem, start)
-    yield from _iterate_draws(problem, start)
+    direct = fit_local(problem, start) if is_near(problem, start) else None
+    yield direct
+    led = yield from _iterate_draws(problem, start)
+    if direct is None and not led:
+        raise NoConvergence(*_FAILED)
 
 
 def _iterate_draws(
     problem: DualClutchProblem, start: ParameterVector
-) -> Iterator[LikelihoodFit | None]:
-    """Yield the fit from each draw that leads near the measurement.
-
-    Raises NoConvergence where none does.
-    """
+) -> Generator[LikelihoodFit | None, None, bool]:
+    """Yield the fit from each draw that leads near the measurement; return whether one does."""
     attempts, tried = _begin_attempts(problem), list[ParameterVector]()
     for _ in refine_draws(attempts, start, compute_spread(problem, start)):
         for one in attempts.starts[len(tried) :]:
             tried.append(one.point)
             if one.cost < SEARCH.near_chi2 * problem.size:
                 yield fit_local(problem, one.point)
-    if not attempts.chi2 < SEARCH.near_chi2:
-        raise NoConvergence(*_FAILED)
+    return bool(attempts.chi2 < SEARCH.near_chi2)
 
 
 def fit_local(
