@@ -257,6 +257,20 @@ def test_steps_on_a_raster_are_no_knots() -> None:
     assert find_filling(time, np.round(values, 6)) is None
 
 
+def test_a_pause_has_no_knot() -> None:
+    """Two records with knots between rows, each filled up on its own."""
+    rng = np.random.default_rng(0)
+    stamps, filled = [], []
+    for start, level in ((0.0, 1500.0), (60.0, 400.0)):
+        knots = start + 0.01 * (np.arange(400) + rng.uniform(-0.1, 0.1, 400))
+        time = start + np.arange(-0.02, 4.02, 0.002)
+        stamps.append(time)
+        filled.append(np.interp(time, knots, level + rng.normal(0.0, 5.0, 400)))
+    found = find_filling(np.concatenate(stamps), np.concatenate(filled))
+    assert found.time.size > 800
+    assert np.all(np.abs(found.values - np.where(found.time < 30.0, 1500.0, 400.0)) < 25.0)
+
+
 @given(
     values=st.lists(
         st.sampled_from([0.0, 1.0, 1e-310, 1e300, -1e300, 3.5, np.nan]), min_size=0, max_size=400

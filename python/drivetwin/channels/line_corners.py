@@ -390,7 +390,7 @@ def _join_lines(
     """
     at, heights = time[found.rows], values[found.rows]
     if pairs is not None:
-        at, heights = _meet_lines(time, values, found.rows, pairs)
+        at, heights = _meet_lines(time, values, found, pairs)
     ends = np.concatenate((time[:1], at, time[-1:]))
     parts = np.round(np.diff(ends) / found.period).astype(int)
     wide = [*np.flatnonzero(parts > 1), *np.flatnonzero(parts[[0, -1]] == 1) * (parts.size - 1)]
@@ -404,15 +404,20 @@ def _join_lines(
 
 
 def _meet_lines(
-    time: FloatArray, values: FloatArray, rows: NDArray[np.intp], bent: NDArray[np.bool_]
+    time: FloatArray, values: FloatArray, found: _Corners, bent: NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return instants [s] and heights of knots at single bent `rows` (m,) and between pairs."""
+    """Return instants [s] and heights of knots at single bent rows (m,) and between pairs.
+
+    No knot lies in a pause of the record.
+    """
+    rows = found.rows
     at, heights = time[rows], values[rows]
     pair = np.flatnonzero(bent[np.minimum(rows + 1, time.size - 1)])
     left = np.concatenate(([0], rows))[pair]
     right = np.concatenate((rows, [time.size - 1]))[pair + 1]
     low, high = rows[pair], rows[pair] + 1
-    fits = (left < low) & (right > high)
+    pause = time[np.minimum(high, time.size - 1)] - time[low]
+    fits = (left < low) & (right > high) & (pause < _PAUSE * found.period)
     pair, left, right, low, high = (one[fits] for one in (pair, left, right, low, high))
     left = np.minimum(left + bent[np.minimum(left + 1, time.size - 1)], low - 1)
     rise = (values[low] - values[left]) / (time[low] - time[left])

@@ -60,6 +60,7 @@ from drivetwin.logs.quality.consistency_checks import (
     check_coverage,
     check_final_drive,
     check_gearing,
+    check_jumps,
     check_torque_balance,
     check_torque_signs,
     mark_late_samples,
@@ -244,17 +245,20 @@ def _drop_inconsistent(
 ) -> tuple[dict[str, Channel], list[Finding]]:
     """Drop the channels outside `strict` that contradict others; return the rest, and findings.
 
-    Raises TimeError or PlausibilityError where the strict ones contradict each other.
+    Raises a typed error where the strict ones contradict each other.
     """
     kept = {role: one for role, one in channels.items() if role in strict}
+    for channel in kept.values():
+        check_jumps(channel, channels, file)
     _check_consistency(kept, card, file)
     findings = []
     for role, channel in channels.items():
         if role in strict:
             continue
         try:
+            check_jumps(channel, channels, file)
             _check_consistency({**kept, role: channel}, card, file)
-        except (TimeError, PlausibilityError) as fault:
+        except (TimeError, DamagedChannelError, PlausibilityError) as fault:
             findings.append(_report_left_out(channel.source_name, fault))
         else:
             kept[role] = channel
@@ -264,7 +268,7 @@ def _drop_inconsistent(
 def _check_consistency(
     channels: Mapping[str, Channel], card: VehicleCard | None, file: str
 ) -> None:
-    """Raise TimeError or PlausibilityError where channels contradict each other or the card."""
+    """Raise a typed error where channels contradict each other or the card."""
     check_common_span(channels, file)
     if card is not None:
         check_gearing(channels, card, file)

@@ -11,6 +11,7 @@ from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.findings import Finding
 from drivetwin.logs.quality.channel_checks import check_channel
+from drivetwin.logs.quality.consistency_checks import check_jumps
 from tests.support.arrays import FloatArray
 
 
@@ -34,4 +35,5 @@ def check(role: str, values: FloatArray, unit: str = "", time: FloatArray | None
     """Check `values` in SI, whose file states `unit`; 100 Hz by default."""
     time = np.round(np.arange(values.size) * 0.01, 2) if time is None else time
     done = check_channel(Channel(role, get_quantity(role), time, values, "X", unit), "log.csv")
+    check_jumps(done.channel, {}, "log.csv")
     return Checked(done.channel, tuple(done.findings), time)

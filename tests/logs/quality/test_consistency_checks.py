@@ -11,7 +11,9 @@ import pytest
 
 from drivetwin.channels.roles import get_quantity
 from drivetwin.channels.shiftlog import Channel
+from drivetwin.errors import DamagedChannelError
 from drivetwin.findings import Number, render
+from drivetwin.logs.arrays import read_arrays
 from drivetwin.logs.quality.consistency_checks import (
     check_final_drive,
     check_torque_balance,
@@ -107,3 +109,28 @@ def test_reading_a_log_tells_the_final_drive(tmp_path: Path) -> None:
     assert any("final_drive = 5.15" in one for one in render(read_log(path, off).findings))
     fits = read_log(path, card(tmp_path))
     assert not any("final_drive" in one for one in render(fits.findings))
+
+
+@pytest.mark.parametrize("excursion", [0, 20])
+def test_only_a_shaft_between_clutch_and_gears_may_jump(excursion: int) -> None:
+    """Dogs engage at 3 s, the clutch closes from 3.4 s on; an excursion is of no gear."""
+    time = 0.01 * np.arange(600.0)
+    output = 60.0 + 0.5 * time
+    closing = np.clip((time - 3.4) / 0.3, 0.0, 1.0)
+    engine = np.where(time < 2.0, 3.0 * output, (1.0 - closing) * 200.0 + closing * 5.0 * output)
+    inlet = np.where(time < 3.0, 3.0, 5.0) * output
+    inlet[400 : 400 + excursion] -= 102.4
+    noise = np.random.default_rng(0).normal(0.0, 0.02, (3, time.size))
+    names = ("n_in", "n_out", "n_engine")
+    values = dict(zip(names, np.array([inlet, output, engine]) + noise, strict=True))
+
+    def read(*roles: str) -> None:
+        mapping = dict(zip(roles, names, strict=True))
+        table = {"t": time, **values}
+        read_arrays(table, None, dict.fromkeys(names, "rad/s"), mapping, needed=roles)
+
+    sound = ("input_speed", "output_speed", "engine_speed")
+    if not excursion:
+        read(*sound)
+    with pytest.raises(DamagedChannelError, match=r"'n_in'.* jumps from"):
+        read(*(sound if excursion else ("engine_speed", "output_speed", "input_speed")))

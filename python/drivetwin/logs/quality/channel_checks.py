@@ -22,7 +22,7 @@ from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.findings import Code, Finding, Number, report
-from drivetwin.logs.quality.consistency_checks import check_jumps, find_lost_messages
+from drivetwin.logs.quality.consistency_checks import find_lost_messages
 from drivetwin.logs.quality.outliers import (
     BEYOND,
     Damage,
@@ -155,7 +155,6 @@ def check_channel(channel: Channel, file: str) -> Checked:
         _check_count(channel, total, where)
     _check_magnitude(channel, where)
     _check_sign(channel, where)
-    check_jumps(channel, where)
     _check_wraps(channel, where)
     findings += _check_limit(channel)
     findings += _check_rest(channel)

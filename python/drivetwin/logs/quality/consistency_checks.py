@@ -25,7 +25,11 @@ from drivetwin.vehicle.vehicle_card import VehicleCard
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
 """Speed change [rad/s] and rate [rad/s2] that no wheel shows between samples."""
 OF_A_MOTOR = 1e4
-"""Rate [rad/s2] of the other shafts: 300 N m accelerate a motor of 0.04 kg m2 at 7500 rad/s2."""
+"""Rate [rad/s2] of the other shafts by their own torque: 300 N m accelerate a motor of 0.04 kg m2
+at 7500 rad/s2. A clutch or a gear that closes on the input shaft is faster."""
+
+_CLOSES = 0.5
+"""Longest time [s] in which a clutch that closes takes the input shaft along."""
 
 CLOSE = 2.5
 """Samples within so many median intervals follow each other; a longer pause is one of the file."""
@@ -50,16 +54,21 @@ def find_lost_messages(channel: Channel) -> Damage | None:
     return Damage(mask, Code.MESSAGES_LOST) if mask.any() else None
 
 
-def check_jumps(channel: Channel, where: Where) -> None:
+def check_jumps(channel: Channel, beside: Mapping[str, Channel], file: str) -> None:
     """Refuse a speed that jumps further than the time since its last change allows.
 
-    Its number has overflown, or the sensor drops out.
+    Its number has overflown, or the sensor drops out. The shaft between clutch and gears jumps as
+    they close, and then turns with a neighbour; `beside` are the channels of the log.
     """
-    if channel.quantity is not Quantity.SPEED:
-        return
-    if not _find_far_steps(channel.values)[0].size:
+    if channel.quantity is not Quantity.SPEED or not _find_far_steps(channel.values)[0].size:
         return
     jumps = _find_steep_steps(channel, _measure_delays(channel)[1])
+    if channel.role == "input_speed" and jumps.size:
+        jumps = jumps[np.diff(jumps, append=channel.time.size) > 1]  # one may take several samples
+        ends = np.searchsorted(channel.time, channel.time[jumps + 1] + _CLOSES)
+        ends[:-1] = np.minimum(ends[:-1], jumps[1:] + 1)
+        count = np.append(0, np.cumsum(_is_carried_along(channel, beside)))
+        jumps = jumps[count[ends] == count[jumps + 1]]
     if not jumps.size:
         return
     index = int(jumps[0]) + 1
@@ -71,8 +80,23 @@ def check_jumps(channel: Channel, where: Where) -> None:
         f"jumps from {before} to {after} between two samples ({jumps.size} such jumps)",
         "the number may overflow or the sensor drop out: cut the log to a sound span, or map "
         "another channel",
-        Where(where.file, where.channel, float(channel.time[index])),
+        Where(file, channel.source_name, float(channel.time[index])),
     )
+
+
+def _is_carried_along(channel: Channel, beside: Mapping[str, Channel]) -> NDArray[np.bool_]:
+    """Return the samples (n,) at which the shaft between clutch and gears turns with the engine,
+    or with the output in a ratio that the log holds while the clutch is closed."""
+    nothing = np.full(channel.time.size, np.nan)
+    engine, output = (
+        beside[role].interpolate(channel.time) if role in beside else nothing
+        for role in ("engine_speed", "output_speed")
+    )
+    closed = np.abs(channel.values - engine) < IN_GEAR * np.abs(engine)
+    ratio = np.divide(channel.values, output, out=nothing.copy(), where=np.abs(output) > STANDSTILL)
+    held = np.sort(ratio[closed & np.isfinite(ratio)])
+    low, high = (np.searchsorted(held, one * ratio) for one in (1.0 - IN_GEAR, 1.0 + IN_GEAR))
+    return np.asarray(closed | ((high - low) * channel.step > _HELD))
 
 
 def _find_steep_steps(channel: Channel, pause: FloatArray) -> NDArray[np.intp]:
