@@ -40,8 +40,13 @@ from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.result.method import Method
 from drivetwin.report.html import build_joint_page, build_report_page, render_page
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
-from drivetwin.validation.validated_model import ValidatedModel, identify_validated
+from drivetwin.validation.validated_model import (
+    JointIdentification,
+    Source,
+    ValidatedModel,
+    identify_together,
+    identify_validated,
+)
 from drivetwin.vehicle.spec import SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from drivetwin.workbench.identifying import Task, identify_all

@@ -30,7 +30,7 @@ from drivetwin.estimation.result.validation import Outcome
 from drivetwin.parameters import split_log_number
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import RoadLoad
-from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
+from drivetwin.validation.validated_model import JointIdentification, Source, identify_together
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

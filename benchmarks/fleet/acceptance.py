@@ -20,8 +20,7 @@ from drivetwin.cli.fleet import show_progress
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet
 from drivetwin.fleet.mixed_model.mixed import Interval, JointEstimate
-from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.rules import Sources, read_rules
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Event, Settled, State
 from tests.support.synthetic_fleet import (

@@ -29,11 +29,9 @@ from typing import Any
 
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.pool import ONE_THREAD
-from drivetwin.fleet.rows import RowKind
-from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.rules import Sources, read_rules
 from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Event, Settled, Started, State
+from drivetwin.fleet.task import Event, RowKind, Settled, Started, State
 
 ROOT = Path(__file__).parents[2]
 LOGS, FIRST = 60, 20

@@ -11,8 +11,7 @@ from pathlib import Path
 from time import process_time
 
 from drivetwin.fleet.identify import identify_log
-from drivetwin.fleet.rows import Found, Row, RowKind
-from drivetwin.fleet.task import Task, TaskSpec
+from drivetwin.fleet.task import Found, Row, RowKind, Task, TaskSpec
 from tests.support.synthetic_fleet import make_fleet
 
 CLOCK = "processor_time"

@@ -16,8 +16,7 @@ from drivetwin.errors import DrivetwinError, FileFormatError
 from drivetwin.export.parameters.files import ParameterFormat, read_parameters
 from drivetwin.export.parameters.template import read_template
 from drivetwin.files.result_file import load_result
-from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.rules import Sources, read_rules
 from drivetwin.gearbox import load_gearbox
 from drivetwin.logs.read import read_log, read_raw
 

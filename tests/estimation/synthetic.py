@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import estimate_rounding_step
 from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,

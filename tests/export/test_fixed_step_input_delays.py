@@ -13,8 +13,7 @@ import pytest
 from drivetwin.export.c.loaded import CModel
 from drivetwin.export.entries import Subject
 from drivetwin.export.fixed_step import InputDelays
-from drivetwin.export.fmu.build import BuildOptions, build_fmu
-from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.fmu.build import BuildOptions, Experiment, build_fmu
 from drivetwin.export.targets import FmiVersion, InputKind
 from tests.export.cases import (
     CASES,

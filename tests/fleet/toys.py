@@ -14,11 +14,10 @@ from typing import Any
 
 from drivetwin import Method
 from drivetwin._util.interrupts import interrupt_on_signals
-from drivetwin.fleet import index, parts, rows, scan, task
+from drivetwin.fleet import parts, scan, task
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.rules import read_rules
-from drivetwin.fleet.sources import Sources
-from drivetwin.fleet.store import Store
+from drivetwin.fleet.rules import Sources, read_rules
+from drivetwin.fleet.store import FileRow, Store
 from drivetwin.fleet.task import to_document
 
 ROOT = Path(__file__).parents[2]
@@ -90,7 +89,7 @@ def fill(
     **file: Any,
 ) -> None:
     """Add a log that is done, as a run does: rows as (kind, name, ..., by name), shifts, file."""
-    made = [rows.Row(rows.RowKind(kind), *values, **named) for kind, *values, named in found]
+    made = [task.Row(task.RowKind(kind), *values, **named) for kind, *values, named in found]
     outcome = task.Outcome(task.State.DONE, tuple(task.ShiftRow(*one) for one in shifts))
     parts.write_part(store.get_part_path(log), log, outcome, made)
     store.index.add_waiting_log(log, "c", "s", "v")
@@ -98,7 +97,7 @@ def fill(
     if file:
         path, rule = file.get("path", log), file.get("rule", "")
         fields = file.get("fields", {})
-        store.index.set_file(index.FileRow(path, log, "c", 1, 1, rule, file["unit"], fields))
+        store.index.set_file(FileRow(path, log, "c", 1, 1, rule, file["unit"], fields))
 
 
 def count_attempts(store: Path) -> dict[str, int]:

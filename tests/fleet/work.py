@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin.errors import FileFormatError
-from drivetwin.fleet.rows import Found, Row, RowKind
-from drivetwin.fleet.task import ShiftRow
+from drivetwin.fleet.task import Found, Row, RowKind, ShiftRow
 
 
 def toy(task: Any) -> Found:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import drivetwin
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import estimate_rounding_step
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run

@@ -24,8 +24,7 @@ from math import hypot
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import integrate_trapezoids
+from drivetwin._util.arrays import FloatArray, integrate_trapezoids
 from drivetwin.actuator.identify import LEAST_KISS, ActuatorSource, IdentifiedActuator
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
 from drivetwin.actuator.search import Fit, Prior, Unknowns, sample_posterior, search_actuator

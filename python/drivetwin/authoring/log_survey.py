@@ -26,8 +26,7 @@ from drivetwin.logs.quality.time_alignment import estimate_final_drive, estimate
 from drivetwin.logs.raw import Remembered
 from drivetwin.logs.read import Demands, read_recording
 from drivetwin.plausibility.entries import PLAUSIBILITY
-from drivetwin.shifts.kinematics import GearboxSpeeds, find_held_ratios, resample_geared
-from drivetwin.shifts.shift import ShiftSettings
+from drivetwin.shifts.shift import GearboxSpeeds, ShiftSettings, find_held_ratios, resample_geared
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ElementSpec, PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard

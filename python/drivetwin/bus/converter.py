@@ -12,13 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray, Span
-from drivetwin._util.signal_processing import find_true_runs
+from drivetwin._util.arrays import FloatArray, Span, find_true_runs
 from drivetwin.bus.phases import CLOSED, SETTINGS, sample_speeds
 from drivetwin.bus.recording import BusLog
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.candidate import Run, detect_gear_runs
-from drivetwin.shifts.kinematics import GearboxSpeeds
+from drivetwin.shifts.shift import GearboxSpeeds
 
 CONVERTER_SLIP = 2.0
 """Shortest slip in a gear [s] that counts as a converter: the clutch of a heavy truck closes within

@@ -49,7 +49,7 @@ from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain, report
 from drivetwin.shifts.coverage import report_unknown_ratios
-from drivetwin.shifts.kinematics import (
+from drivetwin.shifts.shift import (
     RESTS,
     HeldRatio,
     find_held_ratios,

@@ -17,12 +17,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray, Span
-from drivetwin._util.signal_processing import find_true_runs
+from drivetwin._util.arrays import FloatArray, Span, find_true_runs
 from drivetwin.bus.recording import BusLog
 from drivetwin.shifts.candidate import Run, detect_gear_runs
-from drivetwin.shifts.kinematics import GearboxSpeeds
-from drivetwin.shifts.shift import ShiftSettings
+from drivetwin.shifts.shift import GearboxSpeeds, ShiftSettings
 
 SETTINGS = ShiftSettings(ratio_tolerance=0.02)
 """Settings of the gears held. The tolerance is that of a ratio while the driveline swings."""

@@ -9,8 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray, Span
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import FloatArray, Span, estimate_rounding_step
 from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_pauses
 from drivetwin.errors import MissingChannelError, Where

@@ -17,7 +17,7 @@ from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.profiles import Profiles
 from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.shifts.kinematics import get_shift_pressures
+from drivetwin.shifts.shift import get_shift_pressures
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.validation.simulate_log import LoggedShift
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import apply_lag
+from drivetwin._util.arrays import FloatArray, apply_lag
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, ShiftElement, Signal
 from drivetwin.twin.twin import (
     CAPACITY_REFERENCE,

@@ -26,10 +26,11 @@ import numpy as np
 from drivetwin._util.arrays import (
     FloatArray,
     compute_median_step,
+    find_largest,
+    find_true_runs,
     is_time_axis,
     remember_for_arrays,
 )
-from drivetwin._util.signal_processing import find_largest, find_true_runs
 from drivetwin.channels.knot_fit import MIN_KNOTS, KnotRaster, extend_knots, find_raster_of_knots
 from drivetwin.channels.line_corners import (
     PRIOR,

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray, remember_for_arrays
-from drivetwin._util.signal_processing import (
+from drivetwin._util.arrays import (
+    FloatArray,
     estimate_rounding_step,
     find_largest,
     find_true_runs,
+    remember_for_arrays,
 )
 
 PRIOR = float(np.log(1e4))

@@ -104,7 +104,7 @@ def _compare(
 def _describe_ratios(log: Path | None, channels: Path | None) -> str:
     """Describe the ratios that a log holds, as a help to correct a card that cannot be read."""
     from drivetwin.logs.read import read_log
-    from drivetwin.shifts.kinematics import find_held_ratios, resample_geared
+    from drivetwin.shifts.shift import find_held_ratios, resample_geared
 
     if log is None:
         return ""

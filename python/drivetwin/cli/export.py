@@ -6,8 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin._util.outputs import Output, Shape
-from drivetwin._util.request import flag, input_file, option, output_file
+from drivetwin._util.request import Output, Shape, flag, input_file, option, output_file
 from drivetwin.cli.arguments import mapping_option, read_twin_log, result_argument
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError
@@ -101,7 +100,7 @@ def _describe_model(made: ExportedModel, request: Export, path: Path) -> Outcome
     C and FMU leave out elements; their error in the shift of the log is stated.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.export.fmu.experiment import format_inputs
+    from drivetwin.export.fmu.build import format_inputs
 
     files, document = [path], {"file": str(path)}
     subject, experiment = made.subject, made.experiment
@@ -131,7 +130,7 @@ def _load_model(twin: Twin, request: Export) -> ExportedModel:
     gears = None if request.shift is None else parse_gears(request.shift)
     if request.log is None:
         return ExportedModel(build_subject(twin, gears), None)
-    from drivetwin.export.fmu.experiment import build_measured_subject
+    from drivetwin.export.fmu.build import build_measured_subject
 
     recording, _ = read_twin_log(twin, request.log, channels=request.channels)
     found = build_measured_subject(twin, recording, gears, as_logged=request.as_logged)

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from drivetwin._util.outputs import PAGE
 from drivetwin._util.request import (
     MEBIBYTE,
+    PAGE,
     REQUIRED,
     SECOND,
     Request,
@@ -220,8 +220,7 @@ def run(request: RunFleet) -> None:
     The same command continues an interrupted run; finished logs are not computed again.
     """
     from drivetwin.fleet.coordinator import FleetRun, run_fleet
-    from drivetwin.fleet.rules import read_rules
-    from drivetwin.fleet.sources import Sources
+    from drivetwin.fleet.rules import Sources, read_rules
 
     if not request.logs and request.listed is None:
         raise InputError("no logs are named", "give files, folders, a quoted glob or --list FILE")

@@ -32,7 +32,7 @@ from drivetwin.report.blocks import Outcome, Page, Tone
 if TYPE_CHECKING:
     from drivetwin.channels.shiftlog import ShiftLog
     from drivetwin.shifts.detect import FoundShifts
-    from drivetwin.validation.multi_log import JointIdentification
+    from drivetwin.validation.validated_model import JointIdentification
 
 
 def identify(request: Identify) -> Iterator[Outcome]:
@@ -165,7 +165,7 @@ def identify_jointly(
     """
     from drivetwin.estimation.analysis.experiment_design import rank_for_weak
     from drivetwin.shifts.detect import refuse_without_shifts
-    from drivetwin.validation.multi_log import Source, identify_together
+    from drivetwin.validation.validated_model import Source, identify_together
 
     refuse_same_names(logs, "rename one of them")
     card = how.load_card()

@@ -23,7 +23,7 @@ def identify_controller_logs(request: Identify, vehicle: Path) -> Outcome:
     Raises InputError for options of other logs, and the typed errors of reader and fit.
     """
     from drivetwin.files.tcu_twin_file import build_tcu_file
-    from drivetwin.report.tcu import build_tcu_blocks
+    from drivetwin.report.bus import build_tcu_blocks
     from drivetwin.tcu.card import load_controller_card
     from drivetwin.tcu.outcome import identify_controller
 
@@ -57,8 +57,8 @@ def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, .
     from drivetwin.cli.output import write_atomically
     from drivetwin.files.tcu_twin_file import save_tcu_twin
     from drivetwin.files.twin_file import save_twin
+    from drivetwin.report.bus import build_tcu_page
     from drivetwin.report.html import save_page
-    from drivetwin.report.tcu import build_tcu_page
     from drivetwin.twin.of_controller import build_shift_twin
 
     kinds = found.twin.kinds if found.status.is_confirmed else ()

@@ -9,8 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin._util.outputs import Output
-from drivetwin._util.request import Request, flag, input_file, option
+from drivetwin._util.request import Output, Request, flag, input_file, option
 from drivetwin.cli.arguments import find_mapping, log_argument, mapping_option
 from drivetwin.cli.output import print_line, show_step, to_error_document
 from drivetwin.errors import DrivetwinError, UnitError

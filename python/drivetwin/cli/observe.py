@@ -8,8 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drivetwin._util.outputs import LOG_ENDINGS, PAGE, select_outputs
-from drivetwin._util.request import output_file
+from drivetwin._util.request import LOG_ENDINGS, PAGE, output_file, select_outputs
 from drivetwin.cli.arguments import TwinLogInput, read_twin_log
 from drivetwin.cli.output import show_step
 from drivetwin.errors import DamagedChannelError
@@ -83,7 +82,7 @@ def _observe_shifts(
 
 def _write_observations(path: Path, found: Sequence[Observation]) -> None:
     from drivetwin.cli.output import write_atomically
-    from drivetwin.export.parameters.spelling import to_flat_name
+    from drivetwin.export.parameters.content import to_flat_name
     from drivetwin.logs.write import write_log
 
     channels = collect_channels(found)

@@ -16,8 +16,15 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 
 from drivetwin._util.atomic import protect_files, remove_unfinished
-from drivetwin._util.outputs import Output, lock_outputs
-from drivetwin._util.request import Argument, FileRole, Request, get_arguments, spell_option
+from drivetwin._util.request import (
+    Argument,
+    FileRole,
+    Output,
+    Request,
+    get_arguments,
+    lock_outputs,
+    spell_option,
+)
 from drivetwin.cli.arguments import TWIN
 from drivetwin.cli.output import deliver
 from drivetwin.errors import CardError, FileFormatError, InputError, ResultFileError, Where

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin._util.outputs import PAGE
-from drivetwin._util.request import Request, argument, output_file
+from drivetwin._util.request import PAGE, Request, argument, output_file
 from drivetwin.cli.arguments import mapping_option, read_twin_log
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivetwin._util.display_units import format_uncertainty
-from drivetwin._util.outputs import PAGE
-from drivetwin._util.request import FileRole, input_file, output_file
+from drivetwin._util.request import PAGE, FileRole, input_file, output_file
 from drivetwin.cli.arguments import LogInput, find_mapping
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where

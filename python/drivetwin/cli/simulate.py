@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin._util.outputs import PAGE, select_outputs
-from drivetwin._util.request import flag, input_file, option, output_file
+from drivetwin._util.request import PAGE, flag, input_file, option, output_file, select_outputs
 from drivetwin.cli.arguments import (
     MODEL,
     TCU_RESULT,
@@ -140,8 +139,8 @@ def _simulate_controller(twin: Path, request: Simulate) -> Outcome:
     from drivetwin._util.atomic import write_text
     from drivetwin.files.tcu_twin_file import load_tcu_twin, record_prediction
     from drivetwin.report.blocks import Tone, make_notes
+    from drivetwin.report.bus import build_prediction_table, build_predictions_page
     from drivetwin.report.html import save_page
-    from drivetwin.report.tcu import build_prediction_table, build_predictions_page
     from drivetwin.tcu.log import read_controller_log
     from drivetwin.tcu.outcome import list_unfitted_kinds, predict
 

@@ -6,8 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin._util.outputs import LOG_ENDINGS
-from drivetwin._util.request import Request, option, output_file
+from drivetwin._util.request import LOG_ENDINGS, Request, option, output_file
 from drivetwin.cli.output import show_step, write_atomically, write_texts
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.report.blocks import Outcome

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.signal_processing import apply_lag
+from drivetwin._util.arrays import apply_lag
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.errors import InputError, Where
 

@@ -13,7 +13,7 @@ from drivetwin.export.targets import FmiVersion, Names, Platform, Target
 
 if TYPE_CHECKING:
     from drivetwin.export.entries import Subject
-    from drivetwin.export.fmu.experiment import Experiment
+    from drivetwin.export.fmu.build import Experiment
     from drivetwin.export.parameters.content import ParameterSet
     from drivetwin.twin.twin import Twin
 

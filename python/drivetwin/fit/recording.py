@@ -11,8 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import FloatArray, estimate_rounding_step
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import MeasuredSignal

@@ -14,13 +14,11 @@ from pathlib import Path
 from time import monotonic
 
 from drivetwin.errors import StoreError, Where
-from drivetwin.fleet.index import FileRow
 from drivetwin.fleet.options import FleetOptions
 from drivetwin.fleet.pool import LocalPool, Pool, count_usable_cores
-from drivetwin.fleet.rules import RulesFile
+from drivetwin.fleet.rules import RulesFile, Sources
 from drivetwin.fleet.scan import Scan, Scanned, Skipped, make_settings_document
-from drivetwin.fleet.sources import Sources
-from drivetwin.fleet.store import Store
+from drivetwin.fleet.store import FileRow, Store
 from drivetwin.fleet.task import (
     IDENTIFY,
     Aborted,
@@ -284,7 +282,7 @@ def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
 
 def _make_pool(request: FleetRun, tell: Listener) -> Pool:
     if request.scheduler is not None:
-        from drivetwin.fleet.cluster import DaskPool
+        from drivetwin.fleet.pool import DaskPool
 
         return DaskPool(request.scheduler, request.worker, tell)
     return LocalPool(request.workers or count_usable_cores(), request.worker)

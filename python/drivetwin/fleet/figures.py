@@ -11,18 +11,17 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import get_display_unit
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
-from drivetwin.fleet.index import ONE_FILE_EACH
 from drivetwin.fleet.mixed_model.mixed import Drift, JointEstimate
-from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.rules import is_date, to_datetime
-from drivetwin.fleet.store import Store
-from drivetwin.report.figure import Figure
-from drivetwin.report.style import (
+from drivetwin.fleet.store import ONE_FILE_EACH, Store
+from drivetwin.fleet.task import RowKind
+from drivetwin.report.figure import (
     ACCENT,
     BAND,
     FITTED,
     MEASURED,
     MUTED,
+    Figure,
     get_parameter_label,
     make_axis,
     make_layout,

@@ -38,10 +38,18 @@ from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.estimation.result.prior_conflict import remove_prior
 from drivetwin.estimation.result.verdict import assess, reject_identified
 from drivetwin.fleet.parts import convert_write_errors
-from drivetwin.fleet.rows import MU, Found, Row, RowKind, make_estimate_row
+from drivetwin.fleet.rules import name_members
 from drivetwin.fleet.scan import compute_input_hashes
-from drivetwin.fleet.sources import name_members
-from drivetwin.fleet.task import ShiftRow, Task, TaskSpec
+from drivetwin.fleet.task import (
+    MU,
+    Found,
+    Row,
+    RowKind,
+    ShiftRow,
+    Task,
+    TaskSpec,
+    make_estimate_row,
+)
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.open_mapped import NOTHING_STATED
 from drivetwin.logs.read import read_log

@@ -18,8 +18,7 @@ from typing import Any
 
 from drivetwin._util.atomic import write_bytes
 from drivetwin.errors import StoreError, Where
-from drivetwin.fleet.rows import Row, RowKind, make_arrow_table, make_schema
-from drivetwin.fleet.task import GO_ON, Outcome
+from drivetwin.fleet.task import GO_ON, Outcome, Row, RowKind, make_arrow_table, make_schema
 
 INBOX, ROWS = "inbox", "rows"
 """Folders of a store: parts of single logs, and the large parts that take their place."""

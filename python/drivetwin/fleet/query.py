@@ -17,11 +17,9 @@ from typing import Any
 from drivetwin._util.optional_dependencies import import_extra
 from drivetwin._util.text import format_csv_row
 from drivetwin.errors import InputError, QueryError, Where
-from drivetwin.fleet.index import ONE_FILE_EACH, Index
-from drivetwin.fleet.rows import RowKind, make_schema
 from drivetwin.fleet.rules import FILE_COLUMNS, is_date, to_datetime
-from drivetwin.fleet.store import Store
-from drivetwin.fleet.task import Limits
+from drivetwin.fleet.store import ONE_FILE_EACH, Index, Store
+from drivetwin.fleet.task import Limits, RowKind, make_schema
 
 _VIEWS = (RowKind.PARAMETER, RowKind.FRICTION, RowKind.FIT, RowKind.QUALITY, RowKind.WARNING)
 _TABLES = ("logs", "shifts", "settings")

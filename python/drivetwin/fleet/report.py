@@ -27,10 +27,9 @@ from drivetwin.fleet.identify import LIBRARY
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
 from drivetwin.fleet.mixed_model.mixed import Interval, JointEstimate, Outlier
 from drivetwin.fleet.mixed_model.observations import collect_facts, collect_output_fits
-from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.rules import format_reading, format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
-from drivetwin.fleet.task import State
+from drivetwin.fleet.task import RowKind, State
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import (
     Block,
@@ -49,10 +48,10 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
+from drivetwin.report.figure import get_parameter_label
 from drivetwin.report.figures.validation import plot_friction
 from drivetwin.report.html import save_page
 from drivetwin.report.sections.parameters import TONES, make_parameter_cell
-from drivetwin.report.style import get_parameter_label
 from drivetwin.report.whole_drive import build_comparison_table, get_figure_label
 from drivetwin.shifts.quality import QUALITY_UNITS
 

@@ -20,9 +20,8 @@ from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.errors import DrivetwinError, FileFormatError, Where
 from drivetwin.estimation.result.method import Method
-from drivetwin.fleet.index import FileRow
-from drivetwin.fleet.rules import RulesFile, select_rule
-from drivetwin.fleet.sources import Source, Sources, name_members
+from drivetwin.fleet.rules import RulesFile, Source, Sources, name_members, select_rule
+from drivetwin.fleet.store import FileRow
 from drivetwin.fleet.task import Member, Outcome, State, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.vehicle.ratio_card import is_ratio_card

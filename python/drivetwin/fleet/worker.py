@@ -23,8 +23,7 @@ from drivetwin._util.child_process import limit_memory
 from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.errors import DrivetwinError, StoreError
 from drivetwin.fleet.parts import convert_write_errors, write_part
-from drivetwin.fleet.rows import Found
-from drivetwin.fleet.task import Outcome, State, Task, make_memory_outcome
+from drivetwin.fleet.task import Found, Outcome, State, Task, make_memory_outcome
 from drivetwin.logs.formats.guarded import trust_parsers
 
 Work = Callable[[Task], Found]

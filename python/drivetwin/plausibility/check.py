@@ -17,8 +17,14 @@ from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.plausibility.entries import PLAUSIBILITY, check_entries, find_entry
 from drivetwin.plausibility.friction import check_friction, check_inertias, sample_span
 from drivetwin.shifts.coverage import find_causes
-from drivetwin.shifts.kinematics import HeldRatio, find_held_ratios, is_held, resample_speeds
-from drivetwin.shifts.shift import Shift, ShiftSettings
+from drivetwin.shifts.shift import (
+    HeldRatio,
+    Shift,
+    ShiftSettings,
+    find_held_ratios,
+    is_held,
+    resample_speeds,
+)
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

@@ -35,8 +35,7 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figure import Figure, make_trace
-from drivetwin.report.style import SIMULATED, make_axis, make_layout
+from drivetwin.report.figure import SIMULATED, Figure, make_axis, make_layout, make_trace
 from drivetwin.report.trial import (
     get_metric_display,
     plot_distributions,

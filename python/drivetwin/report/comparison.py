@@ -31,16 +31,16 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figures.comparison import (
+from drivetwin.report.figure import get_estimate_label
+from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
+from drivetwin.report.sections.parameters import make_estimate_cell, make_value_cell
+from drivetwin.report.sections.summary import build_labelled_fits
+from drivetwin.report.sections.together import (
     plot_agreement,
     plot_fit_matrix,
     plot_friction_overlay,
     plot_trial,
 )
-from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
-from drivetwin.report.sections.parameters import make_estimate_cell, make_value_cell
-from drivetwin.report.sections.summary import build_labelled_fits
-from drivetwin.report.style import get_estimate_label
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import SIGNALS, simulate_shift

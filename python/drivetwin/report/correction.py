@@ -19,8 +19,8 @@ from drivetwin.report.blocks import (
     Tone,
     make_table,
 )
+from drivetwin.report.figure import MEASURED, MUTED, SIMULATED
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
-from drivetwin.report.style import MEASURED, MUTED, SIMULATED
 
 _FEWEST_MOVED = 0.01
 """Narrowing of an interval below which the logs say nothing of a value [ratio]."""

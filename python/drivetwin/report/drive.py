@@ -13,17 +13,18 @@ from drivetwin._util.display_units import BAR, NM, RPM, Display
 from drivetwin.channels.roles import make_pressure_role
 from drivetwin.drive.result import TRACE_STEP, DriveRun, Maneuver
 from drivetwin.report.blocks import FigureBlock, Page, Section, TableBlock, make_table
-from drivetwin.report.figure import Figure, make_trace
-from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
-from drivetwin.report.style import (
+from drivetwin.report.figure import (
     COMPARED,
     MEASURED,
     MUTED,
     SERIES,
     SIMULATED,
+    Figure,
     make_axis,
     make_layout,
+    make_trace,
 )
+from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.simulation.dual_clutch import FloatArray
 
 

@@ -34,11 +34,10 @@ from drivetwin.report.blocks import (
     build_findings_section,
     make_table,
 )
-from drivetwin.report.figure import Figure
+from drivetwin.report.figure import MEASURED, MUTED, OVER, SIMULATED, UNDER, Figure
 from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
 from drivetwin.report.sections.parameters import build_parameter_blocks
-from drivetwin.report.style import MEASURED, MUTED, OVER, SIMULATED, UNDER
 from drivetwin.simulation.network import NetworkRun, Output
 
 _HEIGHT = 190

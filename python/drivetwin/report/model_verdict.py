@@ -14,7 +14,7 @@ from drivetwin.estimation.result.verdict import get_experiment
 from drivetwin.files.result_file import ResultFile
 from drivetwin.findings import Code, Finding, Severity, explain, report
 from drivetwin.report.blocks import Tone, VerdictBlock
-from drivetwin.report.style import get_channel_label, get_parameter_name
+from drivetwin.report.figure import get_channel_label, get_parameter_name
 
 STATUS_TONES = {
     ModelStatus.VALID: Tone.GOOD,

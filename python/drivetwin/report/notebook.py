@@ -19,7 +19,6 @@ from drivetwin.fit.result import ModelFit
 from drivetwin.report.blocks import Block, TextBlock, build_findings_section, make_table
 from drivetwin.report.data_frames import make_frame
 from drivetwin.report.figure import Figure
-from drivetwin.report.figures.comparison import plot_friction_overlay
 from drivetwin.report.figures.validation import QUANTITIES, plot_log, plot_validation
 from drivetwin.report.fit import build_fit_blocks, plot_recording
 from drivetwin.report.html import render_fragment
@@ -31,7 +30,11 @@ from drivetwin.report.sections.summary import (
     build_friction_table,
     build_phase_table,
 )
-from drivetwin.report.sections.together import build_judgement_blocks, build_log_table
+from drivetwin.report.sections.together import (
+    build_judgement_blocks,
+    build_log_table,
+    plot_friction_overlay,
+)
 from drivetwin.report.text import format_blocks
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.twin.twin import Twin

@@ -10,8 +10,8 @@ from drivetwin._util.display_units import NM
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.observer.linear_model import Band, FloatArray, Observation
 from drivetwin.report.blocks import Block, FigureBlock, Page, Section, make_notes, make_table
+from drivetwin.report.figure import MEASURED, SIMULATED
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
-from drivetwin.report.style import MEASURED, SIMULATED
 from drivetwin.validation.simulate_log import clip_phases
 
 

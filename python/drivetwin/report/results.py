@@ -24,11 +24,10 @@ from drivetwin.files.twin_file import load_twin
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.parameters import ParameterSpec
 from drivetwin.report.blocks import VerdictBlock
-from drivetwin.report.bus import explain_bus
+from drivetwin.report.bus import explain_bus, explain_tcu
 from drivetwin.report.find_reports import Candidate
 from drivetwin.report.fit import build_fit_verdict
 from drivetwin.report.model_verdict import build_verdict_block, explain_result
-from drivetwin.report.tcu import explain_tcu
 from drivetwin.twin.twin import Twin
 
 REPORT, TWIN = "report.html", "twin.toml"

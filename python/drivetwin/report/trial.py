@@ -29,9 +29,19 @@ from drivetwin.report.blocks import (
     make_notes,
     make_table,
 )
-from drivetwin.report.figure import Entry, Figure, make_subplots, make_trace
+from drivetwin.report.figure import (
+    ACCENT,
+    MEASURED,
+    MUTED,
+    SIMULATED,
+    Entry,
+    Figure,
+    make_axis,
+    make_layout,
+    make_subplots,
+    make_trace,
+)
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
-from drivetwin.report.style import ACCENT, MEASURED, MUTED, SIMULATED, make_axis, make_layout
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output
 

@@ -18,9 +18,8 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figure import Figure
+from drivetwin.report.figure import Figure, get_candidate_style, make_axis, make_layout
 from drivetwin.report.figures.validation import plot_shift_phases
-from drivetwin.report.style import get_candidate_style, make_axis, make_layout
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.summary import (

@@ -15,12 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import compute_moving_mean
+from drivetwin._util.arrays import FloatArray, compute_moving_mean
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.shifts.changepoint import Hinge, Moving, fit_hinge
-from drivetwin.shifts.kinematics import GearboxSpeeds
-from drivetwin.shifts.shift import ShiftSettings
+from drivetwin.shifts.shift import GearboxSpeeds, ShiftSettings
 
 _SHARE = 0.05
 """Slip, as a part of what it changes by over the shift, that counts as begun."""

@@ -27,8 +27,13 @@ from drivetwin.shifts.breakaway_lockup import (
     locate_torque_dip,
     smooth_channel,
 )
-from drivetwin.shifts.kinematics import GearboxSpeeds, is_shared_pressure
-from drivetwin.shifts.shift import Shift, ShiftSettings, classify_shift
+from drivetwin.shifts.shift import (
+    GearboxSpeeds,
+    Shift,
+    ShiftSettings,
+    classify_shift,
+    is_shared_pressure,
+)
 from drivetwin.shifts.tcu_flags import find_flag_start
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue

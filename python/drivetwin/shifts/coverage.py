@@ -24,18 +24,19 @@ from drivetwin.channels.units import BAR
 from drivetwin.errors import DamagedChannelError, MissingChannelError, TimeError, Where
 from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.candidate import detect_gear_runs
-from drivetwin.shifts.kinematics import (
+from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, find_open_spans
+from drivetwin.shifts.shift import (
     RESTS,
     GearboxSpeeds,
     HeldRatio,
+    Shift,
+    ShiftSettings,
     compute_gear_ratios,
     find_held_ratios,
     is_ratio,
     is_shared_pressure,
     resample_speeds,
 )
-from drivetwin.shifts.lockup_clutch import LETS_GO, TURBINE_TORQUE, find_open_spans
-from drivetwin.shifts.shift import Shift, ShiftSettings
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

@@ -22,9 +22,15 @@ from drivetwin.shifts.candidate import (
     find_resting_ratio,
 )
 from drivetwin.shifts.coverage import find_causes
-from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
 from drivetwin.shifts.quality import compute_shift_quality
-from drivetwin.shifts.shift import RejectedShift, Shift, ShiftSettings
+from drivetwin.shifts.shift import (
+    GearboxSpeeds,
+    RejectedShift,
+    Shift,
+    ShiftSettings,
+    compute_gear_ratios,
+    resample_speeds,
+)
 from drivetwin.shifts.tcu_flags import check_flags
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

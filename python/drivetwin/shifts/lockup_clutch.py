@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray, Span
-from drivetwin._util.signal_processing import compute_moving_mean, find_true_runs
+from drivetwin._util.arrays import FloatArray, Span, compute_moving_mean, find_true_runs
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import IdentificationError, Where

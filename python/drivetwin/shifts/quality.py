@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import filter_zero_phase
+from drivetwin._util.arrays import FloatArray, filter_zero_phase
 from drivetwin.channels.roles import make_command_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
-from drivetwin.shifts.kinematics import GearboxSpeeds, compute_gear_ratios, resample_speeds
-from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.shift import GearboxSpeeds, Shift, compute_gear_ratios, resample_speeds
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

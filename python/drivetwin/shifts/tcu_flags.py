@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.arrays import Span
-from drivetwin._util.signal_processing import find_true_runs
+from drivetwin._util.arrays import Span, find_true_runs
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import RejectedShift, Shift

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, estimate_rounding_step
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.plain_values import to_plain_values
-from drivetwin._util.signal_processing import estimate_rounding_step
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.channels.read_options import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import Identification

@@ -19,9 +19,8 @@ from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.estimation.result.validation import SignalTrace, Validation, compute_fit
 from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
-from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
-from drivetwin.shifts.shift import Shift, compute_exclusive_masks
+from drivetwin.shifts.shift import Shift, compute_exclusive_masks, get_shift_pressures
 from drivetwin.simulation.driveline_run import DrivelineTask
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, State, Trajectory
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin

@@ -17,13 +17,12 @@ from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
 from drivetwin.findings import Code, report
 from drivetwin.report.bus import BusOutcome, identify_vehicle
-from drivetwin.report.figure import Figure
+from drivetwin.report.figure import ACCENT, MUTED, Figure
 from drivetwin.report.figures.validation import plot_shift_phases
-from drivetwin.report.style import ACCENT, MUTED
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.multi_log import Source, identify_together
+from drivetwin.validation.validated_model import Source, identify_together
 from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from drivetwin.workbench.jobs import Emit, to_fault

@@ -14,7 +14,7 @@ from drivetwin.report.bus import BusOutcome
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
-from drivetwin.validation.multi_log import Source as FitSource
+from drivetwin.validation.validated_model import Source as FitSource
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
 from drivetwin.vehicle.ratio_card import RatioCard

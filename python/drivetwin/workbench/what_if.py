@@ -13,10 +13,9 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import make_link
-from drivetwin.report.figure import Figure
+from drivetwin.report.figure import COMPARED, Figure, get_parameter_name
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
-from drivetwin.report.style import COMPARED, get_parameter_name
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS
 from drivetwin.simulation.dual_clutch import (

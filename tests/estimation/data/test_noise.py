@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import estimate_rounding_step
 from drivetwin.estimation.data.noise import estimate_quantization_error, estimate_white_noise
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from tests.support.arrays import FloatArray

@@ -11,7 +11,7 @@ import drivetwin
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.dual_clutch import RoadLoad
-from drivetwin.validation.multi_log import JointIdentification, Source, identify_together
+from drivetwin.validation.validated_model import JointIdentification, Source, identify_together
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.estimation.asked import DURATION
 from tests.support.bench import read_run

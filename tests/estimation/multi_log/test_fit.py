@@ -12,7 +12,7 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.multi_log.fit import merge_tolerances
-from drivetwin.validation.multi_log import identify_together
+from drivetwin.validation.validated_model import identify_together
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.multi_log.fixtures import (
     LOADS,

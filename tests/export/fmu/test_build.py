@@ -20,8 +20,7 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from drivetwin.errors import InputError
-from drivetwin.export.fmu.build import BuildOptions, build_fmu
-from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.fmu.build import BuildOptions, Experiment, build_fmu
 from drivetwin.export.parameters.files import read_parameters
 from drivetwin.export.targets import FmiVersion, InputKind, Platform
 from tests.export.cases import (

@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.export.entries import Subject
-from drivetwin.export.fmu.experiment import Experiment
+from drivetwin.export.fmu.build import Experiment
 from drivetwin.export.modelica.model import format_modelica, write_modelica
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (

@@ -21,8 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import integrate_trapezoids
+from drivetwin._util.arrays import FloatArray, integrate_trapezoids
 from drivetwin.actuator.from_torque import TorqueRecord, identify_from_torque
 from drivetwin.actuator.identify import (
     ActuatorSource,

@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import FloatArray, estimate_rounding_step
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 

@@ -16,8 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivetwin._util.arrays import Span
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import Span, estimate_rounding_step
 from drivetwin.channels.roles import OIL_PLACES
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError
@@ -36,13 +35,12 @@ from drivetwin.estimation.data.shift_data import (
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.detect import FoundShifts, refuse_without_shifts
-from drivetwin.shifts.kinematics import get_shift_pressures
 from drivetwin.shifts.lockup_clutch import (
     check_lockup_observed,
     refer_to_turbine,
     require_locked_converter,
 )
-from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.shifts.shift import RejectedShift, Shift, get_shift_pressures
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance, multiply
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

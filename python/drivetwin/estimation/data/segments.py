@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivetwin._util.arrays import Span
-from drivetwin._util.signal_processing import compute_moving_mean
+from drivetwin._util.arrays import Span, compute_moving_mean
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.noise import prepare_signal

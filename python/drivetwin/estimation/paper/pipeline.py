@@ -16,8 +16,7 @@ from itertools import product
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray, Span
-from drivetwin._util.signal_processing import compute_moving_mean
+from drivetwin._util.arrays import FloatArray, Span, compute_moving_mean
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
 from drivetwin.estimation.direct.load_balance import (

@@ -11,8 +11,7 @@ from importlib import resources
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.export.parameters.content import format_number
-from drivetwin.export.parameters.spelling import make_distinct, to_ascii_line
+from drivetwin.export.parameters.content import format_number, make_distinct, to_ascii_line
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.network import Sine
 

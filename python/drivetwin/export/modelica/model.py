@@ -40,7 +40,7 @@ from drivetwin.simulation.element_schema import GROUND, list_ports
 from drivetwin.simulation.network import Element, Start
 
 if TYPE_CHECKING:
-    from drivetwin.export.fmu.experiment import Experiment
+    from drivetwin.export.fmu.build import Experiment
 
 
 MSL_VERSION = "4.0.0"

@@ -1,18 +1,248 @@
 # SPDX-License-Identifier: MIT
-"""Format-independent contents of a parameter file: named numbers and curves with units.
-
-A `Codec` writes a `ParameterSet` and reads it back unchanged, after `legal` has respelled the names
-and texts that the format does not allow.
-"""
+"""Contents of a parameter file of any format: numbers, curves, units, names and texts."""
 
 from __future__ import annotations
 
 import math
+import re
+import unicodedata
+import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import TypeVar
 
+from drivetwin._util.display_units import BAR, RPM, get_display_unit
+from drivetwin._util.text import escape_line, escape_text
 from drivetwin.errors import FileFormatError, InputError, Where
+
+
+def add_child(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.Element:
+    """Append an element with a text and return it."""
+    element = ET.SubElement(parent, tag, attributes)
+    element.text = text or None
+    return element
+
+
+def format_comment(lines: Iterable[str]) -> str:
+    """The lines as one XML comment, which may not hold two hyphens; nothing without lines."""
+    text = "\n".join(f"  {escape_line(line)}" for line in lines)
+    text = re.sub("-(?=-)", "- ", text)
+    return f"<!--\n{text}\n-->" if text else ""
+
+
+def format_document(root: ET.Element, *heads: str) -> str:
+    """Return the tree as indented UTF-8 text, behind the declaration and further `heads`.
+
+    Characters without a glyph, most of which XML cannot hold, are written as escapes.
+    """
+    for element in root.iter():
+        element.text = element.text and escape_text(element.text)
+        element.attrib.update({key: escape_line(text) for key, text in element.attrib.items()})
+    ET.indent(root)
+    body = ET.tostring(root, encoding="unicode")
+    declaration = '<?xml version="1.0" encoding="UTF-8"?>'
+    return "\n".join(part for part in (declaration, *heads, body) if part) + "\n"
+
+
+def parse_xml(text: str, source: str) -> ET.Element:
+    """Root of a document. Raises FileFormatError where it is no XML or declares entities."""
+    if "<!ENTITY" in text:
+        raise FileFormatError(
+            "the document declares entities", "write them out", Where(file=source)
+        )
+    try:
+        return ET.fromstring(text.encode("utf-8"), parser=ET.XMLParser(encoding="utf-8"))
+    except ET.ParseError as fault:
+        raise FileFormatError(
+            f"no XML: {fault}", "hand in the file as it was written", Where(file=source)
+        ) from None
+
+
+def get_text(element: ET.Element, path: str) -> str:
+    """Text of the first element at `path`, empty where there is none."""
+    return (element.findtext(path) or "").strip()
+
+
+_GREEK = {
+    letter: unicodedata.name(letter).rpartition(" ")[2].lower()
+    for letter in map(chr, range(ord("α"), ord("ω") + 1))
+}
+_SIGNS = {
+    "µ": "mu",
+    "λ": "lambda",
+    "Δ": "Delta",
+    "Σ": "Sigma",
+    "±": "+/-",
+    "×": "x",
+    "≈": "~",
+    "≤": "<=",
+    "≥": ">=",
+    "°": "deg ",
+    "′": "'",
+    "·": "*",
+    "→": "->",
+    "–": "-",
+    "—": "-",
+    "−": "-",
+    "⁻": "^-",
+    "²": "^2",
+    "³": "^3",
+    "ß": "ss",
+}
+_REPLACED = str.maketrans({**_GREEK, **_SIGNS})
+
+_MATLAB_NAME_LENGTH = 63
+_MATLAB_KEYWORDS = re.compile(
+    "break|case|catch|classdef|continue|else|elseif|end|for|function|global|if|otherwise|parfor|"
+    "persistent|return|spmd|switch|try|while"
+)
+
+
+def to_one_line(text: str) -> str:
+    """The text with white space as single blanks, without control characters."""
+    kept = (
+        " " if char.isspace() else char
+        for char in text
+        if char.isspace() or unicodedata.category(char) not in _UNPRINTABLE
+    )
+    return " ".join("".join(kept).split())
+
+
+_UNPRINTABLE = frozenset({"Cc", "Cf", "Cn", "Co", "Cs"})
+"""Unicode categories that an XML file may not hold or that nobody sees."""
+
+
+def to_ascii_line(text: str) -> str:
+    """One line in 7 bits, without the double quote and the backslash that would end or escape it.
+
+    Greek letters are spelled, accents dropped; what has no counterpart becomes a question mark.
+    """
+    plain = unicodedata.normalize("NFKD", to_one_line(text).translate(_REPLACED))
+    bare = "".join(char for char in plain if not unicodedata.combining(char))
+    return to_one_line(
+        bare.encode("ascii", "replace").decode().replace('"', "'").replace("\\", "/")
+    )
+
+
+def to_free_name(name: str) -> str:
+    """Any name on one line, `_` where nothing is left."""
+    return to_one_line(name) or "_"
+
+
+def to_dotted_name(name: str) -> str:
+    """Identifier of calibration tools: letters, digits, `_` and `.`, no digit or dot in front.
+
+    Something stands after every dot, as in the structured names of FMI.
+    """
+    plain = re.sub(r"^(?=[0-9.])|^$", "_", re.sub(r"[^A-Za-z0-9_.]", "_", to_ascii_line(name)))
+    return re.sub(r"\.(?=\.|$)", "_", plain)
+
+
+def to_flat_name(name: str) -> str:
+    """Identifier of MATLAB: letters, digits and `_`, a letter in front, at most 63 characters."""
+    flat = re.sub(r"[^A-Za-z0-9_]", "_", to_ascii_line(name))
+    if not flat[:1].isalpha() or _MATLAB_KEYWORDS.fullmatch(flat):
+        flat = f"p_{flat}"
+    return flat[:_MATLAB_NAME_LENGTH]
+
+
+def make_distinct(names: Iterable[str], spelled: Callable[[str], str]) -> dict[str, str]:
+    """Each name as `spelled`; those that would coincide are numbered."""
+    chosen: dict[str, str] = {}
+    for name in names:
+        one, count = spelled(name), 1
+        while one in chosen.values():
+            count += 1
+            one = spelled(f"{name} {count}")
+        chosen[name] = one
+    return chosen
+
+
+def to_tool_unit(unit: str) -> str:
+    """Unit as calibration tools show it: `-` without dimension."""
+    return "-" if unit == "1" else unit
+
+
+def parse_tool_unit(shown: str) -> str:
+    """Inverse of `to_tool_unit`; nothing at all also means without dimension."""
+    return "1" if shown.strip() in ("", "-") else shown.strip()
+
+
+def choose_unit(si: str) -> tuple[str, float]:
+    """Return the unit for people and its factor from SI; units but bar and rpm stay SI."""
+    display = get_display_unit(si)
+    return (display.label, display.factor) if display in (BAR, RPM) else (si, 1.0)
+
+
+def append_axis(text: str, axis: str) -> str:
+    """Description of a curve that also names its axis, for formats without a place for that."""
+    return f"{text} (over {axis})".strip()
+
+
+def split_axis(text: str) -> tuple[str, str]:
+    """Inverse of `append_axis`: text and axis, which is `x` where none is named."""
+    found = re.fullmatch(r"(.*?) ?\(over ([A-Za-z0-9_.]+)\)", text)
+    return (found[1], found[2]) if found else (text, "x")
+
+
+_BASE = {
+    "kg": {"kg": 1},
+    "m": {"m": 1},
+    "s": {"s": 1},
+    "rad": {"rad": 1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Hz": {"s": -1},
+    "1": {},
+}
+_FACTOR = re.compile(r"([A-Za-z]+|1)(?:\^(\d+(?:\.\d+)?))?")
+
+
+def parse_base_units(unit: str) -> dict[str, int] | None:
+    """Powers of kg, m, s and rad behind a unit; None where they are not whole numbers.
+
+    What follows a `/` is one denominator, with or without parentheses. Raises InputError for a
+    unit that is not made of these.
+    """
+    powers: dict[str, Fraction] = {}
+    for sign, group in _parse_groups(unit):
+        for name, power in group:
+            for base, own in _BASE[name].items():
+                powers[base] = powers.get(base, Fraction(0)) + sign * power * own
+    if any(power.denominator != 1 for power in powers.values()):
+        return None
+    return {base: int(power) for base, power in powers.items() if power}
+
+
+def is_same_unit(stated: str, expected: str) -> bool:
+    """Return True if the unit in a file is `expected`; a missing unit, `1`, is accepted.
+
+    Units with equal base units are the same, e.g. `Pa` and `N/m^2`.
+    """
+    if stated in ("1", expected):
+        return True
+    try:
+        return parse_base_units(stated) == parse_base_units(expected)
+    except InputError:
+        return False
+
+
+def _parse_groups(unit: str) -> list[tuple[int, list[tuple[str, Fraction]]]]:
+    numerators, *denominators = unit.replace("(", "").replace(")", "").split("/")
+    return [
+        (sign, [_parse_factor(part, unit) for part in group.split("*")])
+        for sign, group in ((1, numerators), *((-1, each) for each in denominators))
+    ]
+
+
+def _parse_factor(text: str, unit: str) -> tuple[str, Fraction]:
+    found = _FACTOR.fullmatch(text.strip())
+    if found is None or found[1] not in _BASE:
+        raise InputError(
+            f"unit {unit!r} is not made of {', '.join(_BASE)}", "write it in SI, as in N*m*s/rad"
+        )
+    return found[1], Fraction(found[2] or 1)
 
 
 @dataclass(frozen=True)

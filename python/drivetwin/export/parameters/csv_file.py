@@ -21,8 +21,9 @@ from drivetwin.export.parameters.content import (
     build_curve,
     format_number,
     parse_finite,
+    to_free_name,
+    to_one_line,
 )
-from drivetwin.export.parameters.spelling import to_free_name, to_one_line
 
 _COLUMNS = ("name", "axis", "at", "axis_unit", "value", "unit", "text")
 _TITLE = "# Parameters of "

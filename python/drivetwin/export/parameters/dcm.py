@@ -20,12 +20,10 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
+    append_axis,
     build_curve,
     format_number,
     parse_finite,
-)
-from drivetwin.export.parameters.spelling import (
-    append_axis,
     parse_tool_unit,
     split_axis,
     to_ascii_line,

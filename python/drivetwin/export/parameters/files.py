@@ -11,8 +11,7 @@ from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file, write_t
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import FileFormatError, InputError, Where
 from drivetwin.export.parameters import cdfx, csv_file, dcm, matlab, ssv
-from drivetwin.export.parameters.content import ParameterSet, round_to, state_bounds
-from drivetwin.export.parameters.spelling import choose_unit
+from drivetwin.export.parameters.content import ParameterSet, choose_unit, round_to, state_bounds
 
 
 class ParameterFormat(StrEnum):

@@ -19,8 +19,9 @@ from drivetwin.export.parameters.content import (
     build_curve,
     format_number,
     parse_finite,
+    to_ascii_line,
+    to_flat_name,
 )
-from drivetwin.export.parameters.spelling import to_ascii_line, to_flat_name
 
 _TITLE = "%% Parameters of "
 _LINE = re.compile(r"(\w+)\s*=\s*([^;%]+);\s*(?:%\s*\[([^\]]*)\]\s*(.*))?")

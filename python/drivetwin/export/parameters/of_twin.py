@@ -18,8 +18,14 @@ from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.calibration.policy import PolicyParameter
 from drivetwin.calibration.profiles import ClosedLoop
-from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.spelling import choose_unit, to_one_line
+from drivetwin.export.parameters.content import (
+    Axis,
+    Curve,
+    ParameterSet,
+    Scalar,
+    choose_unit,
+    to_one_line,
+)
 from drivetwin.export.targets import Names
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.simulation.dual_clutch import Signal

@@ -18,15 +18,13 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
-    build_curve,
-    format_number,
-    parse_finite,
-)
-from drivetwin.export.parameters.spelling import (
     add_child,
+    build_curve,
     format_comment,
     format_document,
+    format_number,
     parse_base_units,
+    parse_finite,
     parse_xml,
     to_dotted_name,
     to_one_line,

@@ -24,16 +24,14 @@ from drivetwin.export.parameters.content import (
     Curve,
     ParameterSet,
     Scalar,
-    round_to,
-    state_bounds,
-)
-from drivetwin.export.parameters.files import CODECS, ParameterFormat
-from drivetwin.export.parameters.spelling import (
     is_same_unit,
     parse_tool_unit,
+    round_to,
+    state_bounds,
     to_ascii_line,
     to_one_line,
 )
+from drivetwin.export.parameters.files import CODECS, ParameterFormat
 from drivetwin.parameters import get_parameter_spec
 
 _QUANTITIES = {

@@ -10,14 +10,16 @@ import numpy as np
 
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
-from drivetwin.export.parameters.content import Curve, ParameterSet, Scalar
-from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, collect_parameters
-from drivetwin.export.parameters.spelling import (
+from drivetwin.export.parameters.content import (
+    Curve,
+    ParameterSet,
+    Scalar,
     choose_unit,
     is_same_unit,
     to_dotted_name,
     to_flat_name,
 )
+from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, collect_parameters
 from drivetwin.parameters import FINAL_DRIVE, get_parameter_spec, is_ratio, make_ratio_id
 from drivetwin.twin.twin import SIMULATED
 

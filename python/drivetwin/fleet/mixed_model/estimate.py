@@ -29,8 +29,8 @@ from drivetwin.fleet.mixed_model.observations import (
     collect_facts,
     collect_observations,
 )
-from drivetwin.fleet.rows import RowKind
 from drivetwin.fleet.store import Store
+from drivetwin.fleet.task import RowKind
 from drivetwin.parameters import get_parameter_spec
 
 Mask = NDArray[np.bool_]

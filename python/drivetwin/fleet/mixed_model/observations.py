@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.fleet.index import ONE_FILE_EACH
 from drivetwin.fleet.mixed_model.mixed import FloatArray, JointEstimate, Outlier
-from drivetwin.fleet.rows import RowKind
-from drivetwin.fleet.store import Store
+from drivetwin.fleet.store import ONE_FILE_EACH, Store
+from drivetwin.fleet.task import RowKind
 
 _FIT = "output_torque.all.fit_percent"
 _WORST = 0.02

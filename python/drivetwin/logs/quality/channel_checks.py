@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import SHORTEST_STEP, remember_for_arrays
-from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.signal_processing import (
+from drivetwin._util.arrays import (
+    SHORTEST_STEP,
     estimate_resolution,
     find_large_steps,
     find_largest,
     find_true_runs,
+    remember_for_arrays,
 )
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.channels.roles import AUXILIARY, Quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units

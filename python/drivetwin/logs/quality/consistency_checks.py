@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray, remember_for_arrays
+from drivetwin._util.arrays import FloatArray, find_large_steps, find_true_runs, remember_for_arrays
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.signal_processing import find_large_steps, find_true_runs
 from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.roles import AUXILIARY, Quantity, get_quantity
 from drivetwin.channels.shiftlog import Channel, find_uncovered_ends

@@ -11,13 +11,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import compute_median_step, remember_for_arrays
-from drivetwin._util.signal_processing import (
+from drivetwin._util.arrays import (
+    compute_median_step,
     estimate_resolution,
     find_large_steps,
     find_largest,
     find_run_bounds,
     find_true_runs,
+    remember_for_arrays,
     sample_blocks,
 )
 from drivetwin.channels.roles import Quantity

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from drivetwin._util.arrays import remember_for_arrays
-from drivetwin._util.signal_processing import integrate_trapezoids
+from drivetwin._util.arrays import integrate_trapezoids, remember_for_arrays
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.vehicle.spec import PriorValue

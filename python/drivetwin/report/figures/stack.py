@@ -16,8 +16,15 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display
-from drivetwin.report.figure import Entry, Figure, make_trace
-from drivetwin.report.style import PHASE_FILL, PHASE_NUMBER, make_axis, make_layout
+from drivetwin.report.figure import (
+    PHASE_FILL,
+    PHASE_NUMBER,
+    Entry,
+    Figure,
+    make_axis,
+    make_layout,
+    make_trace,
+)
 
 MAX_POINTS = 4000
 _OUTSIDE = 600

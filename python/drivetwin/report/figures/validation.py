@@ -14,7 +14,25 @@ from drivetwin.channels.roles import Quantity, make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.validation import SignalTrace, Validation
-from drivetwin.report.figure import Entry, Figure, make_trace
+from drivetwin.report.figure import (
+    ACCENT,
+    BAND,
+    COMPARED,
+    FITTED,
+    MEASURED,
+    MUTED,
+    OVER,
+    SECOND,
+    SERIES,
+    SIMULATED,
+    UNDER,
+    Entry,
+    Figure,
+    get_channel_label,
+    make_axis,
+    make_layout,
+    make_trace,
+)
 from drivetwin.report.figures.stack import (
     MAX_POINTS,
     Curve,
@@ -27,22 +45,6 @@ from drivetwin.report.figures.stack import (
     shade_phases,
     stack_panels,
     write_above,
-)
-from drivetwin.report.style import (
-    ACCENT,
-    BAND,
-    COMPARED,
-    FITTED,
-    MEASURED,
-    MUTED,
-    OVER,
-    SECOND,
-    SERIES,
-    SIMULATED,
-    UNDER,
-    get_channel_label,
-    make_axis,
-    make_layout,
 )
 from drivetwin.shifts.shift import Shift
 

@@ -30,16 +30,17 @@ from drivetwin.report.blocks import (
     make_notes,
     make_table,
 )
-from drivetwin.report.figure import Figure, make_trace
-from drivetwin.report.sections.parameters import TONES, make_parameter_cell
-from drivetwin.report.style import (
+from drivetwin.report.figure import (
     DIVERGING,
     MUTED,
     VERDICT_COLOURS,
+    Figure,
     get_parameter_label,
     make_axis,
     make_layout,
+    make_trace,
 )
+from drivetwin.report.sections.parameters import TONES, make_parameter_cell
 
 _TICKS = [scale * 10.0**power for power in range(-4, 4) for scale in (1.0, 2.0, 5.0)]
 """Labelled values of the logarithmic axis [%]."""

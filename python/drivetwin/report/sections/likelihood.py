@@ -42,20 +42,22 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figure import Figure, make_subplots, make_trace
-from drivetwin.report.figures.stack import Curve, Panel, Phases, stack_panels
-from drivetwin.report.figures.validation import get_shift_spans
-from drivetwin.report.style import (
+from drivetwin.report.figure import (
     DIVERGING,
     FITTED,
     MEASURED,
+    Figure,
     get_channel_display,
     get_channel_label,
     get_channel_symbol,
     get_parameter_label,
     make_axis,
     make_layout,
+    make_subplots,
+    make_trace,
 )
+from drivetwin.report.figures.stack import Curve, Panel, Phases, stack_panels
+from drivetwin.report.figures.validation import get_shift_spans
 from drivetwin.shifts.shift import make_shift_labels
 
 _SIGMA = Display("σ")

@@ -29,9 +29,9 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
+from drivetwin.report.figure import get_estimate_label, get_estimate_name, get_parameter_label
 from drivetwin.report.figures.validation import plot_overview
 from drivetwin.report.model_verdict import build_verdict_block, explain_identification
-from drivetwin.report.style import get_estimate_label, get_estimate_name, get_parameter_label
 
 TONES = {
     Verdict.IDENTIFIED: Tone.GOOD,

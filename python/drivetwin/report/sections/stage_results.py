@@ -25,16 +25,17 @@ from drivetwin.report.blocks import (
     make_notes,
     make_table,
 )
-from drivetwin.report.figure import Figure, make_subplots
-from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
-from drivetwin.report.style import (
+from drivetwin.report.figure import (
     COMPARED,
     FITTED,
     MEASURED,
     MUTED,
+    Figure,
     make_axis,
     make_layout,
+    make_subplots,
 )
+from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.shifts.shift import make_shift_labels
 
 

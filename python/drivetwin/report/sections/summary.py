@@ -37,6 +37,7 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
+from drivetwin.report.figure import get_channel_display, get_channel_label
 from drivetwin.report.figures.validation import (
     plot_friction,
     plot_further_signals,
@@ -44,7 +45,6 @@ from drivetwin.report.figures.validation import (
     plot_shift_phases,
     plot_validation,
 )
-from drivetwin.report.style import get_channel_display, get_channel_label
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.twin.build import list_borrowed_friction
 from drivetwin.validation.simulate_log import EXTRA_SIGNALS, SIGNALS, pool_fits

@@ -13,11 +13,10 @@ from drivetwin._util.display_units import Display
 from drivetwin.channels.units import list_time_spellings
 from drivetwin.errors import InputError
 from drivetwin.logs.survey import Column
-from drivetwin.report.figure import Figure
+from drivetwin.report.figure import MEASURED, Figure
 from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.figures.validation import build_log_panels, plot_log
 from drivetwin.report.sections.inputs import build_column_table
-from drivetwin.report.style import MEASURED
 from drivetwin.workbench.mapping import Entry, Row, list_roles, list_rows, list_unit_names
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened, Preview

@@ -75,7 +75,7 @@ def make_product(work: SessionState, wanted: ExportOptions | Record, scratch: Pa
 
 def _load_model(work: SessionState) -> ExportedModel:
     """Load the model of the shift that is shown, started as it was measured."""
-    from drivetwin.export.fmu.experiment import build_measured_subject
+    from drivetwin.export.fmu.build import build_measured_subject
 
     twin, shift = work.require_twin(), work.require_shift()
     gears = shift.start_gear, shift.end_gear

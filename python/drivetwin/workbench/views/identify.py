@@ -12,10 +12,10 @@ from dash.development.base_component import Component
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.blocks import build_findings_section, make_table
+from drivetwin.report.figure import get_parameter_label
 from drivetwin.report.sections.parameters import build_result_section
 from drivetwin.report.sections.summary import build_fit_table, build_friction_section
 from drivetwin.report.sections.together import build_holdout_section, build_joint_section
-from drivetwin.report.style import get_parameter_label
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import LockKind
 from drivetwin.workbench.identifying import Outcome

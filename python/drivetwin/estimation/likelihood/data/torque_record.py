@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from drivetwin._util.arrays import FloatArray, Span
-from drivetwin._util.signal_processing import estimate_rounding_step
+from drivetwin._util.arrays import FloatArray, Span, estimate_rounding_step
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import ShiftSignals, TorqueOfSpeeds
 from drivetwin.estimation.likelihood.data.input_smoothing import (

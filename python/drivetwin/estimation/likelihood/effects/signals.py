@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import apply_lag
+from drivetwin._util.arrays import FloatArray, apply_lag
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE, TORQUE

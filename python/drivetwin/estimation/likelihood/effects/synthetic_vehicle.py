@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.signal_processing import integrate_trapezoids
+from drivetwin._util.arrays import FloatArray, integrate_trapezoids
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline import settle
 from drivetwin.simulation.driveline_run import DrivelineTask

@@ -8,8 +8,7 @@ import pytest
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
-from drivetwin.shifts.kinematics import get_shift_pressures
-from drivetwin.shifts.shift import Shift
+from drivetwin.shifts.shift import Shift, get_shift_pressures
 from drivetwin.vehicle.shift_kind import ShiftKind
 
 TIME = np.linspace(0.0, 4.0, 401)

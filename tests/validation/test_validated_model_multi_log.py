@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.method import Method
-from drivetwin.validation.multi_log import identify_together
+from drivetwin.validation.validated_model import identify_together
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, together
 
 

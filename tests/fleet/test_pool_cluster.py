@@ -94,7 +94,7 @@ def test_a_scheduler_lost_and_restarted_costs_nothing(tmp_path: Path) -> None:
 def test_a_scheduler_that_is_not_there_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("drivetwin.fleet.cluster._FIRST_CONTACT", 1.0)
+    monkeypatch.setattr("drivetwin.fleet.pool._FIRST_CONTACT", 1.0)
     logs, started = make_logs(tmp_path / "logs", 1), time.monotonic()
     with pytest.raises(SchedulerError, match="no Dask scheduler answers"):
         run_toys(logs, tmp_path / "store", scheduler=f"tcp://127.0.0.1:{free_port()}")

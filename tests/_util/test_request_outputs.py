@@ -10,8 +10,7 @@ from typing import get_type_hints
 
 import pytest
 
-from drivetwin._util.outputs import lock_outputs
-from drivetwin._util.request import COMMANDS, get_arguments
+from drivetwin._util.request import COMMANDS, get_arguments, lock_outputs
 from drivetwin.cli import main
 from drivetwin.errors import InputError
 

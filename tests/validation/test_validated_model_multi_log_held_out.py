@@ -11,7 +11,7 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.result.validation import Outcome
 from drivetwin.findings import render
-from drivetwin.validation.multi_log import predict_held_shifts
+from drivetwin.validation.validated_model import predict_held_shifts
 from tests.estimation.asked import by_the_paper
 from tests.estimation.multi_log.fixtures import LOADS, card, pair, scenario, source, together
 

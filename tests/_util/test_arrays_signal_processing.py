@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
-from drivetwin._util.signal_processing import (
+from drivetwin._util.arrays import (
     compute_moving_mean,
     filter_zero_phase,
     find_large_steps,

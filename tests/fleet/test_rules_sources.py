@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.fleet.sources import Sources
+from drivetwin.fleet.rules import Sources
 
 
 @pytest.fixture
