@@ -15,7 +15,7 @@ from benchmarks.bus.study import FINAL_DRIVE, RADIUS
 from drivetwin.bus.identify import identify_bus
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.logs.read import read_log
-from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.card import RatioCard
 from drivetwin.vehicle.spec import PriorValue
 
 

@@ -21,7 +21,7 @@ from drivetwin.bus.identify import BusIdentification, identify_bus
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.logs.read import read_log
-from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.card import RatioCard
 from drivetwin.vehicle.spec import PriorValue
 
 FINAL_DRIVE, RADIUS = 3.5, 0.5

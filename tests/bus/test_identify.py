@@ -18,7 +18,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import MissingChannelError, NoShiftError
 from drivetwin.findings import Code, Finding
 from drivetwin.logs.read import read_log
-from drivetwin.vehicle.ratio_card import load_ratio_card
+from drivetwin.vehicle.card import load_ratio_card
 from tests.shifts.fixtures import make_log, shared
 from tests.support.repeats import mark_repeats
 

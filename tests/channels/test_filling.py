@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
 
-from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.channels.roles import ReadOptions, TimeColumn
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 from tests.shifts.fixtures import shared

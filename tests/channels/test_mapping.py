@@ -12,7 +12,7 @@ from drivetwin.channels.mapping import (
     recall_channels,
     resolve_roles,
 )
-from drivetwin.channels.read_options import (
+from drivetwin.channels.roles import (
     ChannelSpec,
     Column,
     RememberedChannel,

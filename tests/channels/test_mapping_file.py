@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drivetwin.channels.mapping_file import format_mapping, read_mapping
-from drivetwin.channels.read_options import BusOptions, ChannelSpec, ReadOptions, TimeColumn
+from drivetwin.channels.roles import BusOptions, ChannelSpec, ReadOptions, TimeColumn
 from drivetwin.errors import MappingError
 
 

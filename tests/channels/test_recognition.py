@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.read_options import Column
 from drivetwin.channels.recognition import infer_candidates
+from drivetwin.channels.roles import Column
 
 ELEMENTS = {"B2": "brake", "B3": "brake"}
 

@@ -15,7 +15,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from drivetwin.channels.mapping_file import format_mapping
-from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.roles import ChannelSpec
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.bus_file import BusFile
 from drivetwin.files.fit_file import build_fit_file

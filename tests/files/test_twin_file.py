@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from drivetwin.actuator.identify import IdentifiedActuator
 from drivetwin.actuator.model import ActuatorModel
-from drivetwin.channels.read_options import (
+from drivetwin.channels.roles import (
     BusOptions,
     ChannelSpec,
     ReadOptions,

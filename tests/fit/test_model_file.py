@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.roles import ChannelSpec
 from drivetwin.errors import InputError
 from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance, list_fixed

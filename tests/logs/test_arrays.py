@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.roles import ChannelSpec
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import (
     DrivetwinError,

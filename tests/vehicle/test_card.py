@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.read_options import ChannelSpec
+from drivetwin.channels.roles import ChannelSpec
 from drivetwin.errors import CardError
 from drivetwin.vehicle.card import load_card
 from drivetwin.vehicle.spec import PriorValue

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.authoring.card_edit import list_numbers, replace_numbers
+from drivetwin.authoring.card_text import list_numbers, replace_numbers
 from drivetwin.errors import CardError, DrivetwinError, InputError, RefusedError
 from drivetwin.vehicle.card import load_card
 from tests.workbench.conftest import CARD, LOG

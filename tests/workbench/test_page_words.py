@@ -15,7 +15,7 @@ from drivetwin.workbench.page_words import replace_options
 ROOT = Path(__file__).parents[2] / "python" / "drivetwin"
 ABOVE = ("cli", "fleet", "calibration", "observer", "estimation/multi_log", "estimation/analysis")
 """Packages whose messages the workbench never shows."""
-ELSEWHERE = ("workbench/server.py", "report/results.py", "vehicle/effects.py",
+ELSEWHERE = ("workbench/server.py", "report/results.py", "vehicle/spec.py",
              "validation/validated_model.py", "files/limits_file.py", "errors.py")  # fmt: skip
 """Files whose messages it never shows."""
 COMMAND = re.compile(r"(?<![\w-])--[a-z]|'drivetwin ")

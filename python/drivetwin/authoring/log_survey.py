@@ -14,14 +14,19 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.authoring.stated_number import StatedNumber
 from drivetwin.channels.mapping import Mapped, make_spec, select_free
 from drivetwin.channels.names import load_name_table, normalise_name
-from drivetwin.channels.read_options import ChannelSpec, Column
 from drivetwin.channels.recognition import WHOLE_WORD, infer_candidates
-from drivetwin.channels.roles import Quantity, get_pressure_element, make_pressure_role
+from drivetwin.channels.roles import (
+    ChannelSpec,
+    Column,
+    Quantity,
+    get_pressure_element,
+    make_pressure_role,
+)
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import MissingChannelError, TimeError
 from drivetwin.findings import Code
-from drivetwin.logs.open_mapped import open_stated
+from drivetwin.logs.formats.detect import open_stated
 from drivetwin.logs.quality.time_alignment import estimate_final_drive, estimate_speed_ratio
 from drivetwin.logs.raw import Remembered
 from drivetwin.logs.read import Demands, read_recording

@@ -57,7 +57,7 @@ from drivetwin.shifts.shift import (
     is_ratio,
     merge_equal_ratios,
 )
-from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.card import RatioCard
 from drivetwin.vehicle.spec import Z95
 
 _BEYOND_METER = ("eta", "k_o", "c_o", "mu_gain", "P0")

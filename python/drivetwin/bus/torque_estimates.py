@@ -37,7 +37,7 @@ from drivetwin.bus.torque import (
 from drivetwin.estimation.result.estimate import Z95, Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain
-from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.card import RatioCard
 
 
 @dataclass(frozen=True, eq=False)

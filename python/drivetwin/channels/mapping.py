@@ -7,19 +7,17 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from drivetwin.channels.read_options import (
+from drivetwin.channels.recognition import infer_candidates, prefer_filled
+from drivetwin.channels.roles import (
+    MEASURED,
+    ROLES,
+    STAND_INS,
     BusOptions,
     ChannelSpec,
     Column,
     ReadOptions,
     RememberedChannel,
     TimeColumn,
-)
-from drivetwin.channels.recognition import infer_candidates, prefer_filled
-from drivetwin.channels.roles import (
-    MEASURED,
-    ROLES,
-    STAND_INS,
     get_element,
     get_pressure_element,
     is_extra,

@@ -25,11 +25,14 @@ from drivetwin._util.toml import (
 )
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.names import normalise_name
-from drivetwin.channels.read_options import BusOptions, ChannelSpec, ReadOptions, TimeColumn
 from drivetwin.channels.roles import (
     EXTRA_ROLES,
     PLACED_ROLES,
     ROLES,
+    BusOptions,
+    ChannelSpec,
+    ReadOptions,
+    TimeColumn,
     get_element,
     get_place,
     get_quantity,

@@ -14,7 +14,7 @@ from pathlib import Path
 from pydantic import Field
 
 from drivetwin._util.toml import StrictModel, read_toml
-from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.roles import TimeColumn
 from drivetwin.channels.units import find_unit, is_time_unit, is_unit
 from drivetwin.errors import MappingError, MissingChannelError, Where, suggest_spelling
 

@@ -12,9 +12,9 @@ from functools import cache
 from itertools import chain
 
 from drivetwin.channels.names import NameTable, load_name_table, normalise_name
-from drivetwin.channels.read_options import Column
 from drivetwin.channels.roles import (
     EXTRA_ROLES,
+    Column,
     Quantity,
     get_element,
     get_extra_quantity,

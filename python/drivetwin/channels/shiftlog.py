@@ -14,8 +14,12 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import compute_median_step, remember_for_arrays
 from drivetwin._util.rich_display import DisplayMixin
 from drivetwin.channels.filling import Filling
-from drivetwin.channels.read_options import RememberedMapping
-from drivetwin.channels.roles import Quantity, get_pressure_element, make_pressure_role
+from drivetwin.channels.roles import (
+    Quantity,
+    RememberedMapping,
+    get_pressure_element,
+    make_pressure_role,
+)
 from drivetwin.channels.update_raster import UpdateRaster, find_raster, find_updates
 from drivetwin.errors import MissingChannelError, TimeError, Where
 from drivetwin.findings import Finding

@@ -13,7 +13,6 @@ import typer
 from drivetwin.cli.calibrate import calibrate
 from drivetwin.cli.card import card
 from drivetwin.cli.command_group import PLAIN, CommandGroup, Entry
-from drivetwin.cli.demo import demo
 from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
 from drivetwin.cli.export import export
@@ -28,7 +27,7 @@ from drivetwin.cli.report import report
 from drivetwin.cli.schema import schema
 from drivetwin.cli.shifts import shifts
 from drivetwin.cli.simulate import simulate
-from drivetwin.cli.synth import synth
+from drivetwin.cli.synth import demo, synth
 from drivetwin.cli.try_controller import try_controller
 from drivetwin.cli.workbench import workbench
 from drivetwin.errors import INTERRUPTED, DrivetwinError, InputError, Where

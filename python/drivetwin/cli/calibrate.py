@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""`drivetwin calibrate TWIN --shift 2-3`: shift profiles that survive the spread of units."""
+"""`drivetwin calibrate TWIN --shift 2-3`: profiles, or own controllers, that survive the spread."""
 
 from __future__ import annotations
 
 import math
 import re
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from drivetwin._util.request import CELSIUS, REQUIRED, flag, input_file, option, output_folder
@@ -20,9 +22,10 @@ from drivetwin.cli.calibrate_logs import (
     load_starts,
     to_correction_document,
 )
-from drivetwin.cli.output import show_step
-from drivetwin.cli.own_controller import compile_controller
+from drivetwin.cli.output import print_line, show_step
 from drivetwin.errors import (
+    CompilerError,
+    ControllerError,
     DrivetwinError,
     IdentificationError,
     InfeasibleError,
@@ -30,6 +33,49 @@ from drivetwin.errors import (
     Where,
 )
 from drivetwin.report.blocks import Block, Outcome
+
+if TYPE_CHECKING:
+    from drivetwin.calibration.policies.own import UserController
+
+
+@contextmanager
+def compile_controller(path: Path, *, bench: bool = False) -> Iterator[UserController]:
+    """Compile the controller of a parameter file for the block, perhaps with the test bench.
+
+    Errors of the controller name its source. Warnings that the file asks for go to stderr.
+    """
+    from drivetwin.calibration.policies import own
+    from drivetwin.export.compiler import compile_library, detect_platform
+    from drivetwin.files.limits_file import build_user_controller, load_controller_file
+
+    content = load_controller_file(path)
+    sources = [one.resolve() for one in content.list_sources(path)]
+    folders = [own.HEADER.parent, *((path.parent / one).resolve() for one in content.include)]
+    where = Where(file=", ".join(str(one) for one in content.list_sources(path)))
+    with TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # Windows keeps loaded libraries
+        platform = detect_platform()
+        library = Path(folder) / f"{sources[0].stem}{platform.suffix if platform else '.so'}"
+        files, more = ([own.BENCH], own.BENCH_DEFINES) if bench else ([], ())
+        with show_step(f"compiling {sources[0].name}"):
+            try:
+                message = compile_library(
+                    [*files, *sources],
+                    library,
+                    None,
+                    defines=(*more, *content.defines),
+                    headers=folders,
+                    warnings=content.warnings,
+                )
+            except CompilerError as error:
+                remedy = "correct the C source, or its include folders and defines in the file"
+                raise ControllerError(error.what, remedy, where) from None
+        if content.warnings and message:
+            print_line(message.rstrip(), stderr=True)
+        try:
+            yield build_user_controller(content, library)
+        except ControllerError as error:
+            raise replace(error, where=where) from None
+
 
 if TYPE_CHECKING:
     from drivetwin.calibration.calibrate import Calibration
@@ -196,7 +242,7 @@ def _open_stages(request: Calibrate) -> StagesFile:
         for name, path in request.list_files().items()
     }
     if request.controller is not None:
-        from drivetwin.files.controller_file import load_controller_file
+        from drivetwin.files.limits_file import load_controller_file
 
         sources = load_controller_file(request.controller).list_sources(request.controller)
         contents |= {f"source {one.name}": compute_digest(one) for one in sources}

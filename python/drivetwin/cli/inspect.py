@@ -51,8 +51,7 @@ def inspect(request: Inspect) -> Outcome:
     from drivetwin.files.records import dump_findings
     from drivetwin.logs.formats.can.database import list_databases
     from drivetwin.logs.survey import draft_mapping
-    from drivetwin.vehicle.card import load_card
-    from drivetwin.vehicle.ratio_card import is_ratio_card
+    from drivetwin.vehicle.card import is_ratio_card, load_card
 
     log, write_mapping, accept = request.log, request.write_mapping, request.accept_proposals
     vehicle = request.vehicle
@@ -128,8 +127,8 @@ class _Seen:
 def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds."""
     from drivetwin.channels.mapping import Mapped
-    from drivetwin.channels.read_options import ReadOptions, TimeColumn
-    from drivetwin.logs.open_mapped import open_stated
+    from drivetwin.channels.roles import ReadOptions, TimeColumn
+    from drivetwin.logs.formats.detect import open_stated
     from drivetwin.logs.raw import Remembered
     from drivetwin.logs.survey import find_shortest_step
     from drivetwin.plausibility.check import drop_card_findings
@@ -209,7 +208,7 @@ def _read_as_mapped_log(
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
     """Read a log as for use, missing roles allowed; return findings, error and who refuses it."""
     from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.logs.open_mapped import name_project_mapping
+    from drivetwin.logs.formats.detect import name_project_mapping
     from drivetwin.logs.read import Demands, assemble_log
 
     any_role, for_shifts = Demands((), None, gearing), Demands((), FOR_SHIFTS, gearing)

@@ -59,8 +59,7 @@ def shifts(request: DetectShifts) -> Outcome:
     from drivetwin.shifts.lockup_clutch import detect_lock_ups
     from drivetwin.shifts.shift import make_shift_labels
     from drivetwin.shifts.summary import compare_drives
-    from drivetwin.vehicle.card import load_card
-    from drivetwin.vehicle.ratio_card import is_ratio_card
+    from drivetwin.vehicle.card import is_ratio_card, load_card
 
     if is_ratio_card(request.vehicle):
         return _show_bus_shifts(request)
@@ -267,7 +266,7 @@ def show_bus_shifts(log: Path, vehicle: Path, channels: Path | None) -> Outcome:
     from drivetwin.logs.read import read_log
     from drivetwin.report.blocks import build_findings_section
     from drivetwin.report.bus import build_phase_table
-    from drivetwin.vehicle.ratio_card import load_ratio_card
+    from drivetwin.vehicle.card import load_ratio_card
 
     card = load_ratio_card(vehicle)
     with show_step(f"reading {log.name}"):

@@ -12,8 +12,8 @@ from drivetwin._util.request import REQUIRED, SECOND, input_file, option, output
 from drivetwin.calibration.options import ShiftOptions
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.cli.arguments import REPORT, TwinInput
+from drivetwin.cli.calibrate import compile_controller
 from drivetwin.cli.output import show_step, write_texts
-from drivetwin.cli.own_controller import compile_controller
 from drivetwin.report.blocks import Outcome
 
 if TYPE_CHECKING:

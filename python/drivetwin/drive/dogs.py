@@ -17,10 +17,22 @@ from itertools import zip_longest
 import numpy as np
 
 from drivetwin.drive.driver import LOCK_UP_RAMP, LONGEST_SHIFT, PEDAL_RAMP, STEP, Driver, State
-from drivetwin.drive.plan import LONGEST_LEG, Leg, ShiftTo, Watched, list_forward_gears
+from drivetwin.drive.plan import (
+    CLOSE,
+    FILL,
+    LONGEST_LEG,
+    MARGIN,
+    OPEN,
+    RAMP,
+    Leg,
+    Schedule,
+    ShiftTo,
+    Watched,
+    compute_pressure,
+    list_forward_gears,
+)
 from drivetwin.drive.powertrain import Powertrain
 from drivetwin.drive.result import BRAKE, PEDAL, Action
-from drivetwin.drive.shift_plan import CLOSE, FILL, MARGIN, OPEN, RAMP, Schedule, compute_pressure
 from drivetwin.errors import CardError, InputError, SimulationError
 from drivetwin.gearbox import Gearbox, build_network_elements
 from drivetwin.simulation.dual_clutch import FloatArray, Signal

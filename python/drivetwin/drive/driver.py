@@ -16,11 +16,19 @@ from functools import cache
 import numpy as np
 
 from drivetwin.drive.plan import (
+    CLOSE,
+    FILL,
     LONGEST_LEG,
+    OPEN,
+    RAMP,
+    Knots,
     Leg,
     LockUp,
+    Schedule,
+    ShiftPlan,
     ShiftTo,
     Watched,
+    compute_pressure,
     list_forward_gears,
 )
 from drivetwin.drive.powertrain import Powertrain
@@ -34,16 +42,6 @@ from drivetwin.drive.result import (
     get_crank,
     list_energy_outputs,
     list_outputs,
-)
-from drivetwin.drive.shift_plan import (
-    CLOSE,
-    FILL,
-    OPEN,
-    RAMP,
-    Knots,
-    Schedule,
-    ShiftPlan,
-    compute_pressure,
 )
 from drivetwin.errors import SimulationError
 from drivetwin.gearbox import Gearbox, Reduction, reduce

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from drivetwin.drive.plan import Schedule
 from drivetwin.drive.powertrain import Powertrain
-from drivetwin.drive.shift_plan import Schedule
 from drivetwin.gearbox import Drive, Gearbox, build_network_elements, solve_gear
 from drivetwin.simulation.driveline import (
     CRANK,

@@ -15,7 +15,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.channels.read_options import RememberedMapping
+from drivetwin.channels.roles import RememberedMapping
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import (
     Estimate,

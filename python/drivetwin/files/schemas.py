@@ -47,7 +47,7 @@ _MODELS = {
     FileKind.TWIN: ("files.twin_file", "TwinFile"),
     FileKind.MODEL: ("fit.model_file", "NetworkFile"),
     FileKind.FIT: ("files.fit_file", "FitFile"),
-    FileKind.RATIO_CARD: ("vehicle.ratio_card", "RatioCardFile"),
+    FileKind.RATIO_CARD: ("vehicle.card", "RatioCardFile"),
     FileKind.BUS: ("files.bus_file", "BusFile"),
     FileKind.TCU_CARD: ("tcu.card", "ControllerCardFile"),
     FileKind.TCU: ("files.tcu_twin_file", "TcuFile"),

@@ -22,8 +22,7 @@ from drivetwin._util.toml import (
     read_toml,
     validate_schema,
 )
-from drivetwin.channels.read_options import ChannelSpec
-from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES, get_quantity
+from drivetwin.channels.roles import EXTRA_ROLES, PLACED_ROLES, ROLES, ChannelSpec, get_quantity
 from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance, list_fixed

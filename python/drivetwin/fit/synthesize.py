@@ -14,8 +14,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.plain_values import format_json
-from drivetwin.channels.read_options import ChannelSpec
-from drivetwin.channels.roles import Quantity
+from drivetwin.channels.roles import ChannelSpec, Quantity
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.optimize.objective import ParameterVector

@@ -19,7 +19,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.atomic import write_bytes
 from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.roles import ReadOptions
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import (
     DrivetwinError,
@@ -50,8 +50,7 @@ from drivetwin.fleet.task import (
     TaskSpec,
     make_estimate_row,
 )
-from drivetwin.logs.formats.detect import open_recording
-from drivetwin.logs.open_mapped import NOTHING_STATED
+from drivetwin.logs.formats.detect import NOTHING_STATED, open_recording
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.pipeline import identify
@@ -61,8 +60,7 @@ from drivetwin.report.html import build_report_page, save_library, save_page
 from drivetwin.shifts.detect import FoundShifts, require_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
-from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.ratio_card import load_ratio_card
+from drivetwin.vehicle.card import load_card, load_ratio_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 if TYPE_CHECKING:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Worker pools: the interface used by the coordinator, and the processes of this machine.
+"""Worker pools: the processes of this machine, and a Dask cluster that runs already.
 
 A worker process is guarded: it receives a log and is stopped when it exceeds its limits.
 """

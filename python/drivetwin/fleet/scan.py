@@ -24,7 +24,7 @@ from drivetwin.fleet.rules import RulesFile, Source, Sources, name_members, sele
 from drivetwin.fleet.store import FileRow
 from drivetwin.fleet.task import Member, Outcome, State, TaskSpec
 from drivetwin.logs.formats.detect import open_recording
-from drivetwin.vehicle.ratio_card import is_ratio_card
+from drivetwin.vehicle.card import is_ratio_card
 
 ROWS_FORMAT = 2
 """Counts up when the same identification leaves other rows."""

@@ -15,8 +15,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.names import find_time_indices, rank_clocks
-from drivetwin.channels.read_options import ChannelSpec, TimeColumn
-from drivetwin.channels.roles import FOR_SHIFTS
+from drivetwin.channels.roles import FOR_SHIFTS, ChannelSpec, TimeColumn
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.raw import RawChannel, RawLog, describe_origin, find_origin, subtract_origin

@@ -22,7 +22,7 @@ import numpy as np
 
 from drivetwin._util.arrays import compute_median_step
 from drivetwin.channels.filling import Filling, find_filling
-from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.roles import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray, compute_gap_limit, find_pauses
 from drivetwin.channels.update_raster import UpdateRaster, find_raster
 from drivetwin.errors import DamagedChannelError, Where

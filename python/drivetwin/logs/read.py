@@ -16,17 +16,15 @@ from drivetwin.channels.commands import check_commands
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping, read_project_mapping
-from drivetwin.channels.read_options import (
-    ChannelSpec,
-    ReadOptions,
-    RememberedChannel,
-    RememberedMapping,
-)
 from drivetwin.channels.roles import (
     AUXILIARY,
     FOR_SHIFTS,
     STAND_INS,
+    ChannelSpec,
     Quantity,
+    ReadOptions,
+    RememberedChannel,
+    RememberedMapping,
     get_command_element,
     get_quantity,
     is_extra,
@@ -52,8 +50,7 @@ from drivetwin.errors import (
     suggest_spelling,
 )
 from drivetwin.findings import Code, Finding, report
-from drivetwin.logs.formats.detect import open_recording
-from drivetwin.logs.open_mapped import name_project_mapping, open_as_mapped
+from drivetwin.logs.formats.detect import name_project_mapping, open_as_mapped, open_recording
 from drivetwin.logs.quality.channel_checks import Checked, check_channel
 from drivetwin.logs.quality.consistency_checks import (
     check_common_span,

@@ -14,10 +14,17 @@ from drivetwin._util.arrays import remember_for_arrays
 from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.mapping import Mapped, combine_specs, make_spec, select_free
 from drivetwin.channels.mapping_file import Candidate, Draft, Stub, UnitGap
-from drivetwin.channels.read_options import ChannelSpec, ReadOptions
-from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.recognition import find_hints, infer_candidates
-from drivetwin.channels.roles import NEEDED, ROLES, Quantity, get_quantity, make_pressure_role
+from drivetwin.channels.roles import (
+    NEEDED,
+    ROLES,
+    ChannelSpec,
+    Quantity,
+    ReadOptions,
+    get_quantity,
+    make_pressure_role,
+)
+from drivetwin.channels.roles import Column as LogColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import (
     find_unit,

@@ -9,7 +9,7 @@ from typing import Any
 
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.modeling.model_components import Component
-from drivetwin.report.data_frames import import_pandas
+from drivetwin.report.notebook import import_pandas
 from drivetwin.simulation.dual_clutch import EnergyAudit, Event, FloatArray
 from drivetwin.simulation.network import NetworkRun, Output
 

@@ -24,14 +24,6 @@ from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import SimulationError
 from drivetwin.findings import render
-from drivetwin.observer.inputs import (
-    Recorded,
-    build_course,
-    collect_recorded,
-    compute_measured_slip,
-    is_driving,
-    select_uncertain,
-)
 from drivetwin.observer.linear_model import (
     CARRIED,
     LOAD,
@@ -43,8 +35,14 @@ from drivetwin.observer.linear_model import (
     FloatArray,
     Linear,
     Observation,
+    Recorded,
+    build_course,
     build_linear_model,
+    collect_recorded,
     compute_impulse_response,
+    compute_measured_slip,
+    is_driving,
+    select_uncertain,
 )
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 from drivetwin._util.display_units import format_significant
 from drivetwin.errors import DrivetwinError
 from drivetwin.findings import Finding, Severity, render
-from drivetwin.report.figure import Figure
 
 if TYPE_CHECKING:
+    from drivetwin.report.figure import Figure
     from drivetwin.shifts.shift import Shift
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Result of bus logs as blocks: for page, terminal and notebook."""
+"""Result of bus logs or of a gearbox control as blocks: for page, terminal and notebook."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from drivetwin.report.sections.parameters import build_parameter_blocks
 from drivetwin.tcu.log import SPEEDS
 from drivetwin.tcu.outcome import TcuIdentification
 from drivetwin.tcu.predict import PredictedShift
-from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.card import RatioCard
 
 _HEIGHT = 130
 """Height of a panel [px]."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures as plain data in the form that plotly.js draws: traces and a layout.
+"""Figures as plain data in the form that plotly.js draws, and the style that they share.
 
 The Python library of plotly checks every entry, which takes longer than all else of a page. It is
 imported where a notebook shows a figure; the tests check all figures with it.

@@ -13,9 +13,8 @@ from scipy.constants import zero_Celsius
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.mapping import make_spec
 from drivetwin.channels.mapping_file import read_mapping, read_project_mapping
-from drivetwin.channels.read_options import ChannelSpec, Column
 from drivetwin.channels.recognition import find_candidates
-from drivetwin.channels.roles import get_quantity, make_command_role
+from drivetwin.channels.roles import ChannelSpec, Column, get_quantity, make_command_role
 from drivetwin.channels.units import resolve_channel_unit
 from drivetwin.errors import MappingError, MissingChannelError, NoShiftError, Where
 from drivetwin.logs.formats.detect import open_recording

@@ -1,21 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Vehicle cards: from the TOML file to a VehicleCard in SI, with all faults reported at once."""
+"""The vehicle card, and the card of the ratios alone for bus logs: from files to SI."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
-from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
+from drivetwin._util.toml import Fault, StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.channels.roles import make_pressure_role
 from drivetwin.errors import CardError, suggest_spelling
 from drivetwin.vehicle.effects import EffectId
-from drivetwin.vehicle.schema import CardFile, ElementTable, GearTable, SensorsTable
+from drivetwin.vehicle.schema import (
+    CardFile,
+    ElementTable,
+    GearTable,
+    RadiusEntry,
+    RatioEntry,
+    SensorsTable,
+)
 from drivetwin.vehicle.spec import (
     ElementSpec,
     Gear,
@@ -225,3 +232,59 @@ def _convert_tolerances(sensors: SensorsTable) -> dict[str, SensorTolerance]:
     stated = {role: table for role, table in sensors if role != "pressure" and table is not None}
     stated |= {make_pressure_role(element): table for element, table in sensors.pressure.items()}
     return {role: table.to_tolerance() for role, table in stated.items()}
+
+
+class RatioGearTable(StrictModel):
+    """`[[gears]]`: one gear and its ratio, input over output speed of the gearbox."""
+
+    name: str = Field(min_length=1)
+    ratio: RatioEntry
+
+
+class RatioCardFile(StrictModel):
+    """A card of the ratios alone. Final drive and wheel radius turn the inertia of the vehicle at
+    the gearbox output into its mass."""
+
+    name: str = ""
+    gears: list[RatioGearTable] = Field(min_length=1)
+    final_drive: RatioEntry | None = None
+    wheel_radius_m: RadiusEntry | None = None
+
+
+@dataclass(frozen=True)
+class RatioCard:
+    """Ratios by gear, from high to low; `final_drive` and `wheel_radius` [m] where known."""
+
+    name: str
+    ratios: dict[str, PriorValue]
+    final_drive: PriorValue | None = None
+    wheel_radius: float | None = None
+    source: str = ""
+
+
+def is_ratio_card(path: Path) -> bool:
+    """Return True if a card has no table of shift elements.
+
+    Raises CardError where the file is no TOML.
+    """
+    return "elements" not in read_toml(path, CardError)
+
+
+def load_ratio_card(path: Path) -> RatioCard:
+    """Read a card of the ratios alone, or the ratios of a whole vehicle card.
+
+    Raises CardError that lists all faults by key path.
+    """
+    document = read_toml(path, CardError)
+    if not is_ratio_card(path):
+        card = load_card(path)
+        ratios = {gear.name: gear.ratio for gear in card.gears}
+        radius = None if card.wheel_radius is None else card.wheel_radius.value
+        return RatioCard(card.name, ratios, card.final_drive, radius, str(path))
+    faults = validate_schema(document, RatioCardFile)
+    raise_faults(faults, CardError, str(path), "correct these keys of the card of the ratios")
+    file = RatioCardFile.model_validate(document)
+    final = None if file.final_drive is None else file.final_drive.to_prior()
+    ratios = {one.name: one.ratio.to_prior() for one in file.gears}
+    radius = None if file.wheel_radius_m is None else file.wheel_radius_m.value
+    return RatioCard(file.name, ratios, final, radius, str(path))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivetwin.channels.read_options import ChannelSpec, RememberedMapping
+from drivetwin.channels.roles import ChannelSpec, RememberedMapping
 from drivetwin.errors import CardError, Where
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.dual_clutch import LossLaw

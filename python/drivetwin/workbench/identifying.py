@@ -23,7 +23,7 @@ from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import Source, identify_together
-from drivetwin.vehicle.ratio_card import RatioCard
+from drivetwin.vehicle.card import RatioCard
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from drivetwin.workbench.jobs import Emit, to_fault
 from drivetwin.workbench.zoom import parse_number

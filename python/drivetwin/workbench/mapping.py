@@ -7,17 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from drivetwin.channels.mapping import make_spec
-from drivetwin.channels.read_options import ChannelSpec
-from drivetwin.channels.read_options import Column as LogColumn
 from drivetwin.channels.roles import (
     EXTRA_ROLES,
     ROLES,
+    ChannelSpec,
     Quantity,
     get_quantity,
     is_extra,
     make_command_role,
     make_pressure_role,
 )
+from drivetwin.channels.roles import Column as LogColumn
 from drivetwin.channels.units import (
     is_time_unit,
     list_first_spellings,

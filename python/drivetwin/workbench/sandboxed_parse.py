@@ -28,15 +28,13 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.channels.units import Proposal, propose_time_units
 from drivetwin.errors import DrivetwinError, InputError, UnitError
 from drivetwin.findings import Finding
-from drivetwin.logs.formats.detect import open_recording
+from drivetwin.logs.formats.detect import open_recording, open_stated
 from drivetwin.logs.formats.guarded import compute_parser_limits
-from drivetwin.logs.open_mapped import open_stated
 from drivetwin.logs.read import read_log
 from drivetwin.logs.survey import Survey, find_shortest_step, survey_recording
 from drivetwin.plausibility.check import check_card, drop_card_findings, select_card_findings
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
-from drivetwin.vehicle.card import VehicleCard, load_card
-from drivetwin.vehicle.ratio_card import RatioCard, is_ratio_card, load_ratio_card
+from drivetwin.vehicle.card import RatioCard, VehicleCard, is_ratio_card, load_card, load_ratio_card
 from drivetwin.workbench.jobs import Emit
 from drivetwin.workbench.mapping import Corrections
 

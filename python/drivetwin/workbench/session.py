@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from drivetwin._util.atomic import write_text
-from drivetwin.authoring import card_edit
-from drivetwin.authoring.card_text import refuse_faults
+from drivetwin.authoring.card_text import EntryPath, refuse_faults, replace_numbers
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.question import Key
 from drivetwin.channels.mapping_file import find_project_mapping
@@ -200,12 +199,12 @@ class Session:
             return self._write_text(path, self.form.format_card(path.name), can_replace)
 
     def write_edited_card(
-        self, name: str, numbers: Mapping[card_edit.Path, str], *, can_replace: bool
+        self, name: str, numbers: Mapping[EntryPath, str], *, can_replace: bool
     ) -> Source:
         """Write the open card with other numbers into the folder; see `write_card`."""
         with self.lock:
             path = self.folder.make_new_path(name, ".toml")
-            text = card_edit.replace_numbers(self.read_card_text(), numbers)
+            text = replace_numbers(self.read_card_text(), numbers)
             refuse_faults(text, path.name)
             return self._write_text(path, text, can_replace)
 

@@ -15,9 +15,8 @@ from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import Source as FitSource
-from drivetwin.vehicle.card import VehicleCard
+from drivetwin.vehicle.card import RatioCard, VehicleCard
 from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
-from drivetwin.vehicle.ratio_card import RatioCard
 from drivetwin.workbench.identifying import Boundary, BusTask, Outcome, Refusal, move_boundaries
 from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.sandboxed_parse import Opened

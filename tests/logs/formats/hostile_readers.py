@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.roles import Column, ReadOptions
 from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.logs.raw import RawChannel
 

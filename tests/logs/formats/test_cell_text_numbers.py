@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from asammdf.blocks.conversion_utils import from_dict
 
-from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.channels.roles import BusOptions, ReadOptions
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
 

@@ -11,7 +11,7 @@ import cantools
 import numpy as np
 import pytest
 
-from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.channels.roles import BusOptions, ReadOptions
 from drivetwin.logs.formats.code_texts import CodeMeaning, classify_code_text
 from drivetwin.logs.read import read_raw
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.roles import ReadOptions
 from drivetwin.errors import DamagedChannelError, FileFormatError, ReaderFailureError
 from drivetwin.logs.formats import guarded
 from drivetwin.logs.read import read_log, read_raw

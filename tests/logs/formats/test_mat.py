@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.io import savemat
 from scipy.io.matlab import MatlabOpaque
 
-from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.channels.roles import ReadOptions, TimeColumn
 from drivetwin.errors import MissingChannelError, UnitError
 from drivetwin.logs.formats.mat_signals import find_signals
 from drivetwin.logs.raw import RawChannel, RawLog

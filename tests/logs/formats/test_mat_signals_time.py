@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.channels.roles import ReadOptions, TimeColumn
 from drivetwin.errors import MissingChannelError
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_raw

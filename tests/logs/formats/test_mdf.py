@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.channels.roles import ReadOptions, TimeColumn
 from drivetwin.errors import FileFormatError
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from drivetwin.channels.read_options import ReadOptions, TimeColumn
+from drivetwin.channels.roles import ReadOptions, TimeColumn
 from drivetwin.errors import DamagedChannelError, DrivetwinError
 from drivetwin.logs.formats.mdf import open_mdf
 from drivetwin.logs.formats.mdf_plain import open_plain

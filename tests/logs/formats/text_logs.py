@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from io import BytesIO
 
-from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.roles import TimeColumn
 from drivetwin.errors import DamagedChannelError
 from drivetwin.logs.formats.csv import read_table
 from drivetwin.logs.raw import RawLog

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin.channels.read_options import RememberedMapping
+from drivetwin.channels.roles import RememberedMapping
 from drivetwin.channels.shiftlog import find_pauses
 from drivetwin.findings import Finding
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id

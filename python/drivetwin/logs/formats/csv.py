@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._native import ScannedTable
-from drivetwin.channels.read_options import Column, ReadOptions, TimeColumn
+from drivetwin.channels.roles import Column, ReadOptions, TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, TimeError, Where

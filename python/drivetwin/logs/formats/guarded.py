@@ -27,7 +27,7 @@ import numpy as np
 
 from drivetwin import errors
 from drivetwin._util.child_process import GRACE, describe_end, end_process
-from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.roles import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DrivetwinError, ReaderFailureError, Where
 from drivetwin.logs.raw import Opener, RawChannel, Recording, Window

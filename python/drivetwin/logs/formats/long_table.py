@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from drivetwin._native import ScannedTable
 from drivetwin.channels.names import find_time_indices, is_time_name, split_name_and_unit
-from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.roles import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor, is_time_unit, is_unit
 from drivetwin.errors import FileFormatError, TimeError, Where

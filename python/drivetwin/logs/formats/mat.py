@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
-from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.roles import ReadOptions
 from drivetwin.errors import FileFormatError, MissingChannelError, Where
 from drivetwin.logs.formats.guarded import compute_parser_limits, make_memory_error
 from drivetwin.logs.raw import (

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin.channels.names import can_be_time, is_time_name
-from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.roles import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import Where

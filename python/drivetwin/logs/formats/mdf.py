@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
-from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.roles import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where

@@ -21,7 +21,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors
-from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.roles import ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.logs.formats.can.mdf_frames import has_only_frames
 from drivetwin.logs.formats.mdf import KIND, MdfRecording

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.names import find_time_index, is_time_name, split_name_and_unit
-from drivetwin.channels.read_options import Column, ReadOptions
+from drivetwin.channels.roles import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor
 from drivetwin.errors import DamagedChannelError, FileFormatError, TimeError, Where

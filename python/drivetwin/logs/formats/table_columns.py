@@ -31,7 +31,7 @@ from drivetwin.channels.names import (
     rank_clocks,
     split_name_and_unit,
 )
-from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.roles import TimeColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import is_time_unit, is_unit
 from drivetwin.errors import TimeError, Where

@@ -21,7 +21,7 @@ from typing import BinaryIO
 
 from drivetwin._util.text import restore_cell
 from drivetwin.channels.names import is_time_name, split_name_and_unit
-from drivetwin.channels.read_options import TimeColumn
+from drivetwin.channels.roles import TimeColumn
 from drivetwin.channels.units import find_unit, is_unit
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.cell_text import Meaning, classify_text, is_number, is_time_text

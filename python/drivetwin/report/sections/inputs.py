@@ -12,7 +12,7 @@ from drivetwin.report.blocks import TableBlock, make_table
 
 if TYPE_CHECKING:
     from drivetwin.logs.survey import Column
-    from drivetwin.vehicle.ratio_card import RatioCard
+    from drivetwin.vehicle.card import RatioCard
     from drivetwin.vehicle.spec import PriorValue
     from drivetwin.vehicle.vehicle_card import VehicleCard
 

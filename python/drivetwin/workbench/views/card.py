@@ -16,7 +16,7 @@ from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
-from drivetwin.workbench.views import card_edit, card_form
+from drivetwin.workbench.views import card_form
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.sources import (
@@ -56,7 +56,7 @@ def layout() -> list[Component]:
         dcc.Store(id="card-upload"),
         html.Div(id="card-files"),
         html.Div(id="card-content"),
-        *card_edit.layout(),
+        html.Div(id="edit-content"),
         *card_form.layout(),
     ]
 
@@ -64,7 +64,7 @@ def layout() -> list[Component]:
 def register(page: ui.Page) -> None:
     """Register opening, and the data of the open card."""
     register_opening(page, "card", "card-file", open_card)
-    card_edit.register(page)
+    card_form.register_edit(page)
     card_form.register(page)
 
     @page.callback(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Form for a new vehicle card: a field for each question, with its explanation."""
+"""Forms of a vehicle card: a new one by questions, and the numbers of the open one."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from dash import ALL, Input, Output, State, ctx, html, no_update
 from dash.development.base_component import Component
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from drivetwin.authoring.card_text import EntryPath, format_path, list_numbers
 from drivetwin.authoring.question import FormEntry, Key
 from drivetwin.errors import RefusedError
 from drivetwin.vehicle.card_fields import get_card_field
@@ -209,3 +210,65 @@ def _build_entry(entry: FormEntry) -> Component:
         options = [html.Option(value=str(one)) for one in question.choices]
         parts.append(html.Datalist(options, id=choices))
     return html.Div(parts, className="question")
+
+
+class EntryId(BaseModel, strict=True):
+    """Id of a field: the place of its entry as a JSON list."""
+
+    entry: str
+
+
+def register_edit(page: ui.Page) -> None:
+    """Register the form for the numbers of the open card, and its writing."""
+
+    @page.callback(Output("edit-content", "children"), Input(ui.make_due_id("card"), "data"))
+    def show(session: Session, _: object) -> list[Component]:
+        """Draw the numbers of the open card."""
+        work = session.work
+        if work.opened is None or work.opened.card is None or work.card is None:
+            return []
+        return _build_edit_form(work.card.path.name, list_numbers(session.read_card_text()))
+
+    @page.callback(
+        Input("write-edited", "n_clicks"),
+        State("name-edited", "value"),
+        State("replace-edited", "data-value"),
+        State({"entry": ALL}, "value"),
+        State({"entry": ALL}, "id"),
+        busy="write-edited",
+    )
+    def write(
+        session: Session,
+        clicks: int | None,
+        name: str | None,
+        existing: Literal["keep", "replace"],
+        values: Sequence[str | None],
+        ids: Sequence[EntryId],
+    ) -> None:
+        """Write the card with the typed numbers and open it."""
+        if not clicks:
+            return
+        typed = collect_texts(values, [one.entry for one in ids])
+        open_written(
+            session,
+            session.write_edited_card(name or "", typed, can_replace=existing == "replace"),
+        )
+
+
+def _build_edit_form(name: str, numbers: dict[EntryPath, str]) -> list[Component]:
+    fields = [
+        ui.make_field(
+            {"entry": json.dumps(path)}, format_path(path), type="text", value=text, debounce=True
+        )
+        for path, text in numbers.items()
+    ]
+    form = [
+        html.Summary("Edit the numbers of the open card"),
+        ui.make_hint(
+            "Keys and units are those of the file. A number is VALUE, VALUE+-STD with one standard "
+            "deviation, or LOW..HIGH. Comments and all other entries stay."
+        ),
+        html.Div(fields, className="entries"),
+        build_writing("edited", "Name of the edited card", name, "Write and open the edited card"),
+    ]
+    return [html.Details(form, id="edit-form")]

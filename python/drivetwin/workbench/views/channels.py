@@ -21,12 +21,12 @@ from drivetwin.workbench.mapping import Entry, Row, list_roles, list_rows, list_
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened, Preview
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.views import log_choice, zooming
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views import zooming
 from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import Index
-from drivetwin.workbench.views.log_choice import Place, build_log_choice
+from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
 
 _PREVIEW_HEIGHT = 330
 _PROPOSED = (
@@ -56,7 +56,7 @@ def layout() -> list[Component]:
 def register(page: ui.Page) -> None:
     """Register the callbacks that show and correct the mapping."""
     _register_preview(page)
-    log_choice.register(page, Place.CHANNELS)
+    register_log_choice(page, Place.CHANNELS)
     zooming.register(page, "preview-plot", _get_preview_panels)
     zooming.register(
         page, "channels-plot", lambda session: build_log_panels(session.work.require_log())

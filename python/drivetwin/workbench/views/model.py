@@ -20,12 +20,12 @@ from drivetwin.vehicle.locks import can_fix
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState
-from drivetwin.workbench.views import locks, log_choice, zooming
+from drivetwin.workbench.views import locks, zooming
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
-from drivetwin.workbench.views.log_choice import Place, build_log_choice
+from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
 from drivetwin.workbench.views.stepper import Step
 from drivetwin.workbench.what_if import (
     FRICTION,
@@ -61,7 +61,7 @@ def register(page: ui.Page) -> None:
     _register_bench(page)
     _register_sliders(page)
     locks.register(page)
-    log_choice.register(page, Place.MODEL)
+    register_log_choice(page, Place.MODEL)
     zooming.register(page, "model-plot", _get_model_panels)
 
 

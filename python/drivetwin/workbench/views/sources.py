@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Fields that name a file: a path in the folder of the workbench, or an upload."""
+"""Choice of a log, and fields that name a file: a path in the folder, or an upload."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import StrEnum
 
 from dash import ALL, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin.workbench.session import Session
-from drivetwin.workbench.session_state import Source
+from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.fields import UploadField, get_triggered_part
+from drivetwin.workbench.views.fields import Index, UploadField, get_triggered_part
 
 _UPLOADED = "uploaded: "
 _LISTED = 30
@@ -80,3 +81,30 @@ def register_opening(
         """Open a listed file of the folder."""
         if any(clicks):
             open_source(session, session.get_folder_source(get_triggered_part(files)))
+
+
+class Place(StrEnum):
+    """Views with the choice."""
+
+    CHANNELS = "channels"
+    SHIFTS = "shifts"
+    MODEL = "model"
+
+
+def build_log_choice(work: SessionState, place: Place) -> list[Component]:
+    """Build the choice; nothing for a single log."""
+    if len(work.logs) < 2:
+        return []
+    names = {str(k): one.source.name for k, one in enumerate(work.logs)}
+    return [ui.make_choice(f"{place}-log", "Log shown", names, str(work.at))]
+
+
+def register_log_choice(page: ui.Page, place: Place) -> None:
+    """Register the choice of one view; all views then show the chosen log."""
+
+    @page.callback(Input(f"{place}-log", "data-value"))
+    def choose(session: Session, index: Index | None) -> None:
+        """Show another log."""
+        if index is not None and int(index) != session.work.at:
+            session.select_log(int(index))
+            ui.notify_topic(ui.Topic.SELECTION)

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.channels.roles import BusOptions, ReadOptions
 from drivetwin.errors import FileFormatError
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.channels.roles import BusOptions, ReadOptions
 from drivetwin.errors import MissingChannelError
 from drivetwin.logs.read import read_log, read_raw
 from tests.fuzz.seeds import candump, frames

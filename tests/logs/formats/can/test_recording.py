@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.channels.roles import BusOptions, ReadOptions
 from drivetwin.errors import DamagedChannelError, MissingChannelError
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_log, read_raw

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.channels.read_options import BusOptions, ReadOptions
+from drivetwin.channels.roles import BusOptions, ReadOptions
 from drivetwin.errors import MissingChannelError
 from drivetwin.logs.raw import RawChannel, RawLog
 from drivetwin.logs.read import read_raw

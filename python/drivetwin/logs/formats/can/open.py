@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
-from drivetwin.channels.read_options import ReadOptions
+from drivetwin.channels.roles import ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.database import (

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin.channels.read_options import BusOptions, Column
+from drivetwin.channels.roles import BusOptions, Column
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
 from drivetwin.logs.formats.can.database import (

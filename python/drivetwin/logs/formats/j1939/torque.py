@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.channels.read_options import Column
-from drivetwin.channels.roles import Quantity
+from drivetwin.channels.roles import Column, Quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.errors import DamagedChannelError, Where
 from drivetwin.logs.raw import RawChannel, Recording, Window

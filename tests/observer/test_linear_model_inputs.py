@@ -9,7 +9,7 @@ import pytest
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.observer.inputs import collect_recorded, is_driving
+from drivetwin.observer.linear_model import collect_recorded, is_driving
 from tests.observer.conftest import brief
 from tests.support.bench import read_run
 
