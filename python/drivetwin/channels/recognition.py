@@ -75,7 +75,11 @@ def infer_candidates(
         role: _select_first_match(spelled, [one for one in (added.get(role), *some) if one])
         for role, some in patterns.items()
     }
-    chosen = {role: _drop_secondary(some) for role, some in found.items() if some}
+    chosen = {
+        role: ([column for column in some if not column.aside] or some)
+        for role, some in found.items()
+        if some
+    }
     return add_extra_candidates(chosen, wholes, own)
 
 
@@ -110,10 +114,6 @@ def find_hints(columns: Iterable[Column], role: str) -> dict[str, str]:
 def prefer_filled(candidates: list[Column]) -> list[Column]:
     """Return the columns that hold numbers; all if none does."""
     return [column for column in candidates if not column.empty] or candidates
-
-
-def _drop_secondary(candidates: list[Column]) -> list[Column]:
-    return [column for column in candidates if not column.aside] or candidates
 
 
 def _select_first_match(

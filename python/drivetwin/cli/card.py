@@ -114,7 +114,7 @@ def new(request: NewCard, *, as_json: bool) -> None:
         print_paragraph(f"{survey.name} gives no ratios: {survey.remark}")
     options = CardOptions(given, request.element, request.sensor)
     session = Session(parse_options(options, sources), sources)
-    can_ask = has_terminal() and not as_json
+    can_ask = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
     is_draft = request.draft or (from_log is not None and not can_ask)
     if is_draft:
         session.fill_draft()
@@ -164,11 +164,6 @@ def _make_default_name(output: Path) -> str:
         return parse_name(output.name.removesuffix(".toml").removesuffix(".card"))
     except ValueError:
         return "vehicle"
-
-
-def has_terminal() -> bool:
-    """Return True if questions can be asked: input and output are a terminal."""
-    return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def _ask(question: Question, reason: str) -> str:

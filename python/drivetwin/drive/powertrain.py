@@ -91,10 +91,6 @@ GRAVITY = 9.81
 Positive = Annotated[float, Field(gt=0)]
 
 
-def _check_increasing(values: list[float]) -> bool:
-    return all(a < b for a, b in pairwise(values))
-
-
 class EngineTable(StrictModel):
     """`[engine]`: full-load and motoring torque over speed, lag, idle speed and its governor.
 
@@ -113,7 +109,7 @@ class EngineTable(StrictModel):
     def _fits(self) -> EngineTable:
         if not len(self.speed_rpm) == len(self.full_load_Nm) == len(self.motoring_Nm):
             raise ValueError("speed_rpm, full_load_Nm and motoring_Nm have as many entries")
-        if not _check_increasing(self.speed_rpm):
+        if not all(a < b for a, b in pairwise(self.speed_rpm)):
             raise ValueError("speed_rpm must increase")
         return self
 

@@ -70,16 +70,6 @@ if TYPE_CHECKING:
 LIBRARY = "plotly.js"
 
 
-def save_single(path: Path, found: Identification, log: ShiftLog) -> None:
-    """Write the report of one log; all reports of a fleet use one library file."""
-    _save_page(path, build_report_page(found, log))
-
-
-def save_vehicle(path: Path, outcome: BusOutcome) -> None:
-    """Write the report of the bus logs of one vehicle."""
-    _save_page(path, outcome.build_page())
-
-
 def _save_page(path: Path, page: Page) -> None:
     library = path.with_name(LIBRARY)
     if not library.is_file():
@@ -224,7 +214,7 @@ def _write_artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
     """Write the report and the traces that are wanted besides. Raises StoreError."""
     if task.report is not None:
         with convert_write_errors():
-            save_single(Path(task.report), found, log)
+            (_save_page(Path(task.report), build_report_page(found, log)))
     if task.traces is not None:
         with convert_write_errors():
             save_traces(Path(task.traces), found)
@@ -399,7 +389,7 @@ def identify_members(task: Task, mapping: Path | None) -> Found:
     outcome = identify_vehicle(logs, load_ratio_card(Path(task.recipe.vehicle)))
     if task.report is not None:
         with convert_write_errors():
-            save_vehicle(Path(task.report), outcome)
+            (_save_page(Path(task.report), outcome.build_page()))
     return Found([*_make_rows(outcome), *rows], list(_make_shift_rows(outcome)))
 
 

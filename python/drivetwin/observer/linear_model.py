@@ -85,7 +85,10 @@ def collect_recorded(log: ShiftLog, shift: Shift, i_in: float) -> Recorded:
     }
     if "wheel_speed" in log:
         speeds["wheel_speed"] = prepare_signal(log["wheel_speed"])
-    speeds = {name: _clip_noise(signal) for name, signal in speeds.items()}
+    speeds = {
+        name: (replace(signal, sigma=max(signal.sigma, FLOOR * float(np.ptp(signal.values)))))
+        for name, signal in speeds.items()
+    }
     torque = prepare_signal(log["engine_torque"])
     there = all(make_pressure_role(name) in log for name in (shift.offgoing, shift.oncoming))
     pressures = collect_pressures(log, shift) if there else {}
@@ -115,10 +118,6 @@ def _reduce_samples(signal: MeasuredSignal) -> MeasuredSignal:
     kept = count * (signal.time.size // count)
     time, values = (x[:kept].reshape(-1, count).mean(axis=1) for x in (signal.time, signal.values))
     return MeasuredSignal(time, values, signal.sigma / float(np.sqrt(count)))
-
-
-def _clip_noise(signal: MeasuredSignal) -> MeasuredSignal:
-    return replace(signal, sigma=max(signal.sigma, FLOOR * float(np.ptp(signal.values))))
 
 
 def is_driving(model: DualClutch, seen: Recorded, delay: float) -> BoolArray:

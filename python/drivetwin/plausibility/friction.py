@@ -162,7 +162,7 @@ def _bound_torque(
     if "output_torque" in log:
         channel = log["output_torque"]
         torque = compute_mean(channel, span)
-        if not _is_large(torque, channel):
+        if not abs(torque) > PLAUSIBILITY.least_torque * float(np.abs(channel.values).max()):
             return None
         inertia = 0.0 if card.J_out is None else card.J_out.value
         rate = compute_output_rate(log, card, span)
@@ -179,10 +179,6 @@ def _bound_torque(
     if not np.isfinite(bounds).all() or min(bounds) <= 0.0:
         return None
     return bounds[0], bounds[1]
-
-
-def _is_large(torque: float, channel: Channel) -> bool:
-    return abs(torque) > PLAUSIBILITY.least_torque * float(np.abs(channel.values).max())
 
 
 def check_friction(

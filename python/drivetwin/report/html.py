@@ -67,7 +67,11 @@ class Store:
 
     def add_time(self, time: FloatArray) -> int:
         """Number of a time base (n,), increasing [s]."""
-        return self._add(time, _choose_time_step(time), even=_is_even(time))
+        return self._add(
+            time,
+            (EVEN * float(np.median(np.diff(time))) if time.size > 1 else 1.0),
+            even=_is_even(time),
+        )
 
     def add_values(self, values: FloatArray) -> int:
         """Number of an array (n,); samples that are not finite are gaps."""
@@ -127,10 +131,6 @@ def _is_even(time: FloatArray) -> bool:
         return False
     grid = np.linspace(time[0], time[-1], time.size)
     return bool(np.abs(time - grid).max() <= EVEN * (grid[1] - grid[0]))
-
-
-def _choose_time_step(time: FloatArray) -> float:
-    return EVEN * float(np.median(np.diff(time))) if time.size > 1 else 1.0
 
 
 def _choose_value_step(values: FloatArray) -> float:

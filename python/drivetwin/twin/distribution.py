@@ -34,16 +34,11 @@ def to_law(values: FloatArray) -> Stribeck:
     return Stribeck(mu_c, mu_c + drop, float(np.exp(ln_v_s)), mu_v)
 
 
-def build_from_law(law: Stribeck) -> FloatArray:
-    """Build the derivatives (4, 4) of the values by the fields of a law."""
-    return np.asarray(np.linalg.inv(build_law_derivatives(law.v_s)), dtype=np.float64)
-
-
 def compute_law_covariance(curve: FrictionCurve) -> FloatArray | None:
     """Compute the covariance (4, 4) of the values of a curve; None where it has none."""
     if curve.stribeck is None or curve.stribeck_covariance is None:
         return None
-    rows = build_from_law(curve.stribeck)
+    rows = np.asarray(np.linalg.inv(build_law_derivatives(curve.stribeck.v_s)), dtype=np.float64)
     return np.asarray(rows @ curve.stribeck_covariance @ rows.T)
 
 

@@ -78,7 +78,9 @@ def assess_model(found: Identification) -> Identification:
     failures += [*impossible, *_find_refuted_gains(found)]
     doubts = [*noisy, *implausible]
     estimates = apply_errors(found.estimates, failures)
-    refuted = bool(failures or found.evidence.gave_up) or _is_unexplained(found)
+    refuted = bool(failures or found.evidence.gave_up) or (
+        any(one.code is Code.RESIDUAL_UNEXPLAINED for one in found.findings)
+    )
     suspects = find_suspects(found, friction=GATE.friction) if refuted or doubts else []
     suspects += find_undetermined_gains(found, failures)
     if refuted:
@@ -104,11 +106,6 @@ def _merge_gains(findings: Sequence[Finding]) -> tuple[Finding, ...]:
         kept = [one for one in kept if one.code not in codes or one.names["element"] not in named]
         named |= {one.names["element"] for one in kept if one.code in codes}
     return tuple(kept)
-
-
-def _is_unexplained(found: Identification) -> bool:
-    """Return whether the residual of the fit exceeds its noise; that fails whatever is missing."""
-    return any(one.code is Code.RESIDUAL_UNEXPLAINED for one in found.findings)
 
 
 def _has_limits(found: Identification) -> bool:

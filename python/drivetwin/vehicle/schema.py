@@ -73,15 +73,11 @@ class PriorTable(StrictModel):
         return PriorValue(factor * self.value, factor * self.std)
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
 def _parse_bare_value(value: object) -> object:
     """Read a bare number as a value without a stated standard deviation."""
     if isinstance(value, dict | StrictModel):
         return value
-    if not _is_number(value):
+    if not (isinstance(value, int | float) and not isinstance(value, bool)):
         raise ValueError("should be a valid number, or a table such as { value = 0.8, std = 0.1 }")
     return {"value": value}
 

@@ -113,7 +113,7 @@ def _admit(access: Access) -> Response | None:
 
     GET and HEAD serve the files of the page only, for which the cookie is enough.
     """
-    name = _COOKIE.format(port=_get_port(request.host))
+    name = _COOKIE.format(port=(urlsplit(f"//{request.host}").port or 80))
     if request.path == "/" and _is_equal(request.args.get(_TOKEN_FIELD), access.token):
         response = Response(_ENTRANCE.format(access.key), mimetype="text/html")
         response.headers["Cache-Control"] = "no-store"
@@ -126,11 +126,6 @@ def _admit(access: Access) -> Response | None:
     return make_refusal(
         403, "no access without the link -> open the link that 'drivetwin app' printed when started"
     )
-
-
-def _get_port(host: str) -> int:
-    """Return the port of a checked host header."""
-    return urlsplit(f"//{host}").port or 80
 
 
 def is_own_host(named: str) -> bool:

@@ -82,7 +82,7 @@ def list_variables(subject: Subject) -> tuple[Variable, ...]:
     """All variables: inputs, outputs, parameters; names are structured as FMI has it."""
     model = subject.model
     elements = [element.name for element in model.elements]
-    spelled = make_structured_names(elements)
+    spelled = make_distinct(elements, _make_structured_name)
     names = list(spelled.values())
     return (
         *_list_inputs(names, subject.delays),
@@ -114,11 +114,6 @@ def list_variables(subject: Subject) -> tuple[Variable, ...]:
             for i, e in enumerate(list_entries(model))
         ),
     )
-
-
-def make_structured_names(names: Iterable[str]) -> dict[str, str]:
-    """Name parts that FMI's structured naming accepts; those that would coincide are numbered."""
-    return make_distinct(names, _make_structured_name)
 
 
 def _make_structured_name(name: str) -> str:

@@ -53,7 +53,7 @@ def convert_samples(raw: NDArray[Any], conversion: Any, path: Path) -> Converted
     values. If no text is a number, the codes are, and a note lists the texts. Raises
     ConversionError, and MissingExtraError for a formula without numexpr.
     """
-    if conversion is None or _is_bits(conversion):
+    if conversion is None or (_is_version4(conversion) and conversion.conversion_type == _BITS):
         return Converted(np.asarray(raw, np.float64))
     if not _has_texts(conversion):
         return Converted(convert_numbers(raw, conversion, path))
@@ -219,10 +219,6 @@ def _evaluate_formula(formula: str, values: FloatArray, path: Path) -> FloatArra
 
 def _is_version4(conversion: Any) -> bool:
     return hasattr(conversion, "val_param_nr")
-
-
-def _is_bits(conversion: Any) -> bool:
-    return _is_version4(conversion) and conversion.conversion_type == _BITS
 
 
 def _has_texts(conversion: Any) -> bool:

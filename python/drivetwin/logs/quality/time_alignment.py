@@ -257,15 +257,11 @@ def is_significant_delay(delay: Delay, one: Channel, other: Channel) -> bool:
     return abs(delay.value) > _LEAST_DELAY and beyond > SIGNIFICANT * delay.sigma
 
 
-def _compute_min_delay(one: Channel, other: Channel) -> float:
-    return max(_LEAST_DELAY, 0.5 * one.step, 0.5 * other.step)
-
-
 def _check_delay(delay: Delay | None, other: Channel, reference: Channel) -> list[Finding]:
     """Report the delay of `other` against `reference`, if it is large and certain enough."""
     if delay is None:
         return []
-    least = _compute_min_delay(other, reference)
+    least = max(_LEAST_DELAY, 0.5 * other.step, 0.5 * reference.step)
     findings = []
     if is_significant_delay(delay, other, reference):
         amount = Number(delay.value, "s", 1.96 * delay.sigma)

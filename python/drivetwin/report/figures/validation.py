@@ -203,7 +203,7 @@ def build_shift_panels(log: ShiftLog, shift: Shift) -> list[Panel]:
     panels = []
     for title, display, roles, weight in groups:
         curves = [
-            _build_measured_curve(name, log[role], colour)
+            (Curve(name, log[role].time, log[role].values, colour, step=log[role].held))
             for role, (name, colour) in roles.items()
             if role in log
         ]
@@ -220,10 +220,6 @@ def get_shift_spans(shift: Shift) -> dict[str, tuple[float, float]]:
         "inertia": shift.inertia_phase,
         "after": (shift.lockup_time, shift.after[1]),
     }
-
-
-def _build_measured_curve(name: str, channel: Channel, colour: str) -> Curve:
-    return Curve(name, channel.time, channel.values, colour, step=channel.held)
 
 
 OUTPUTS: Mapping[str, tuple[str, Display, float]] = {

@@ -19,7 +19,6 @@ from drivetwin.estimation.result.estimate import (
     Verdict,
 )
 from drivetwin.estimation.result.verdict import get_advice
-from drivetwin.findings import Code
 from drivetwin.report.blocks import (
     Block,
     Cell,
@@ -235,7 +234,10 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
     for width, name in ranked:
         one = found.estimates[name]
         interval = f"± {format_significant(width, 2)} %"
-        share, advice = _describe_sensor_share(one), _write_advice(one, found.limit)
+        share, advice = (
+            _describe_sensor_share(one),
+            (get_advice(one.id, one.std_noise or 0.0, one.std_systematic, limit=found.limit)),
+        )
         rows.append((make_parameter_cell(name), interval, share, advice))
     columns = (
         "parameter",
@@ -249,10 +251,6 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
         columns,
         rows,
     )
-
-
-def _write_advice(one: Estimate, limit: Code) -> str:
-    return get_advice(one.id, one.std_noise or 0.0, one.std_systematic, limit=limit)
 
 
 def _describe_sensor_share(one: Estimate) -> str:

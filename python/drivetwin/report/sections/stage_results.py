@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import NM
 from drivetwin.estimation.direct.ringdown import RingDown
 from drivetwin.estimation.identification import Identification
@@ -70,7 +69,9 @@ def plot_wlse(fit: GridFit, labels: WlseLabels) -> Figure:
             row=1,
             col=1,
         )
-    ends = _get_ends(fit.acceleration)
+    ends = np.array(
+        [min(0.0, float(fit.acceleration.min())), max(0.0, float(fit.acceleration.max()))]
+    )
     figure.add_scatter(
         x=ends,
         y=ends * _compute_slope(fit),
@@ -114,10 +115,6 @@ def _compute_slope(fit: GridFit) -> float:
     """Weighted least-squares slope of the scatter: J′ for eq. 10, J3/i_f for eq. 11."""
     normal = float(fit.weights @ fit.acceleration**2)
     return float(fit.weights @ (fit.acceleration * fit.torque)) / normal
-
-
-def _get_ends(values: FloatArray) -> FloatArray:
-    return np.array([min(0.0, float(values.min())), max(0.0, float(values.max()))])
 
 
 def plot_ringdown(ring: RingDown) -> Figure:

@@ -201,7 +201,11 @@ def _build_bench(session: Session, live: Live) -> list[Component]:
 def _build_slider(one: Slider, work: SessionState) -> Component:
     """Build a slider between the ends of its range, its number with the unit, and its lock."""
     value, changes = one.value, work.changes
-    lock = [locks.build_controls(work, one.id, locks.Place.SLIDER)] if _has_lock(one) else []
+    lock = (
+        [locks.build_controls(work, one.id, locks.Place.SLIDER)]
+        if (not one.id.startswith(FRICTION) and can_fix(one.id))
+        else []
+    )
     if one.id in changes:
         value = round(changes[one.id] * get_display(one.id).factor / one.step) * one.step
     limits = {"min": one.low, "max": one.high, "step": one.step, "value": value}
@@ -251,10 +255,6 @@ def _explain(fault: DrivetwinError) -> str:
     """Return cause and remedy as sentences in words of the page."""
     parts = [replace_options(part) for part in (fault.what, fault.remedy) if part]
     return " ".join(f"{part[0].upper()}{part[1:]}." for part in parts)
-
-
-def _has_lock(one: Slider) -> bool:
-    return not one.id.startswith(FRICTION) and can_fix(one.id)
 
 
 def _build_fit(live: Live, remark: str) -> list[Component]:
