@@ -31,7 +31,7 @@ from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import Grid, calibrate_map
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
-from drivetwin.cli.identify_run import IdentifyOptions, read_shifts
+from drivetwin.cli.identify import IdentifyOptions, read_shifts
 from drivetwin.cli.output import Remaining
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run

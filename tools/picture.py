@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from drivetwin.cli.identify_run import IdentifiedLog, IdentifyOptions, run_identification
+from drivetwin.cli.identify import IdentifiedLog, IdentifyOptions, run_identification
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario

@@ -13,8 +13,7 @@ import pytest
 from drivetwin import load_card, load_twin
 from drivetwin.drive import load_powertrain
 from drivetwin.errors import DrivetwinError, FileFormatError
-from drivetwin.export.parameters.files import ParameterFormat, read_parameters
-from drivetwin.export.parameters.template import read_template
+from drivetwin.export.parameters.files import ParameterFormat, read_parameters, read_template
 from drivetwin.files.result_file import load_result
 from drivetwin.fleet.rules import Sources, read_rules
 from drivetwin.gearbox import load_gearbox

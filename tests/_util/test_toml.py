@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from drivetwin import load_card
 from drivetwin._util.toml import parse_toml
 from drivetwin.errors import DrivetwinError
-from drivetwin.export.parameters.template import read_template
+from drivetwin.export.parameters.files import read_template
 
 MAX_DEPTH, MAX_TEXT, MAX_SIZE = 50, 100_000, 4_000_000
 """Limits of nesting, of a text [characters] and of a file [bytes]."""

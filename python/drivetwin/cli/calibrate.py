@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 from drivetwin._util.request import CELSIUS, REQUIRED, flag, input_file, option, output_folder
 from drivetwin.calibration.options import CalibrationOptions
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.cli.arguments import RESULT, TWIN, TwinInput
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
     list_log_findings,
     load_starts,
     to_correction_document,
 )
+from drivetwin.cli.options import RESULT, TWIN, TwinInput
 from drivetwin.cli.output import print_line, show_step
 from drivetwin.errors import (
     CompilerError,
@@ -369,9 +369,15 @@ def _write_results(
     from drivetwin._util.optional_dependencies import get_program_version
     from drivetwin._util.plain_values import format_json
     from drivetwin.cli.output import write_atomically
-    from drivetwin.export.parameters.files import ParameterFormat, show_units, write_parameters
+    from drivetwin.export.parameters.files import (
+        ParameterFormat,
+        apply_template,
+        read_template,
+        require_labels,
+        show_units,
+        write_parameters,
+    )
     from drivetwin.export.parameters.of_twin import collect_calibration
-    from drivetwin.export.parameters.template import apply_template, read_template, require_labels
     from drivetwin.files.calibration_file import (
         Provenance,
         build_calibration_file,

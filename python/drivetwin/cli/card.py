@@ -18,8 +18,8 @@ from drivetwin._util.request import (
     output_file,
     spell_option,
 )
-from drivetwin.cli.arguments import find_mapping, mapping_option, strict_flag
 from drivetwin.cli.command_group import CommandGroup
+from drivetwin.cli.options import find_mapping, mapping_option, strict_flag
 from drivetwin.cli.output import (
     print_blocks,
     print_json,

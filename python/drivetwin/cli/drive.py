@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import Request, argument, option, output_folder
-from drivetwin.cli.arguments import GEARBOX_HELP
+from drivetwin.cli.options import GEARBOX_HELP
 from drivetwin.cli.output import show_step
 from drivetwin.report.blocks import Outcome, Page, TextBlock, Tone, make_notes
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import Request, input_file, option, output_folder
-from drivetwin.cli.arguments import card_option, log_argument, mapping_option, strict_flag
+from drivetwin.cli.options import card_option, log_argument, mapping_option, strict_flag
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
@@ -18,7 +18,7 @@ from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import Block, Cell, Outcome, TableBlock, make_table
 
 if TYPE_CHECKING:
-    from drivetwin.cli.identify_run import IdentifiedLog
+    from drivetwin.cli.identify import IdentifiedLog
     from drivetwin.estimation.analysis.profile_likelihood import Profile
     from drivetwin.fit.examine import Improvement
     from drivetwin.twin.twin import Twin
@@ -85,7 +85,7 @@ class Answer:
 
 def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
     """Identify a log; return every answer in the order of printing, and the identification."""
-    from drivetwin.cli.identify_run import (
+    from drivetwin.cli.identify import (
         IdentifyOptions,
         build_outcome,
         run_identification,
@@ -94,7 +94,7 @@ def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
     from drivetwin.estimation.analysis.experiment_design import compute_rankings
     from drivetwin.estimation.analysis.profile_likelihood import compute_profile
     from drivetwin.files import analysis_files
-    from drivetwin.report.sections.identifiability import build_suggestion_blocks
+    from drivetwin.report.sections.parameters import build_suggestion_blocks
 
     assert request.vehicle is not None
     how = IdentifyOptions(vehicle=request.vehicle, channels=request.channels)
@@ -195,7 +195,7 @@ def _iterate_profiles(
 
 def _build_improvement_table(found: Sequence[Improvement], units: Mapping[str, str]) -> TableBlock:
     from drivetwin.fit.examine import REPEATS
-    from drivetwin.report.sections.identifiability import format_half_width
+    from drivetwin.report.sections.parameters import format_half_width
 
     rows = []
     for one in found:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.request import Output, Shape, flag, input_file, option, output_file
-from drivetwin.cli.arguments import mapping_option, read_twin_log, result_argument
+from drivetwin.cli.options import mapping_option, read_twin_log, result_argument
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError
 from drivetwin.export.targets import Target

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.request import FileRole, Request, argument, input_file, option, output_folder
-from drivetwin.cli.arguments import FIT_RESULT, MODEL, REPORT, logs_argument, strict_flag
+from drivetwin.cli.options import FIT_RESULT, MODEL, REPORT, logs_argument, strict_flag
 from drivetwin.cli.output import show_step
 from drivetwin.report.blocks import Outcome
 

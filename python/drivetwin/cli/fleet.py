@@ -27,8 +27,8 @@ from drivetwin._util.request import (
     output_folder,
 )
 from drivetwin._util.text import escape_json
-from drivetwin.cli.arguments import strict_flag
 from drivetwin.cli.command_group import CommandGroup
+from drivetwin.cli.options import strict_flag
 from drivetwin.cli.output import NOT_CONFIRMED, make_console, print_blocks, print_line, show_step
 from drivetwin.errors import INTERRUPTED, InputError
 from drivetwin.fleet.options import FleetOptions

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.request import REQUIRED, Request, argument, option, output_file
-from drivetwin.cli.arguments import GEARBOX_HELP
+from drivetwin.cli.options import GEARBOX_HELP
 from drivetwin.errors import InputError
 from drivetwin.report.blocks import Block, Outcome, Tone, make_notes
 

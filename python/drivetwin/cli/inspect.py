@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.request import Output, Request, flag, input_file, option
-from drivetwin.cli.arguments import find_mapping, log_argument, mapping_option
+from drivetwin.cli.options import find_mapping, log_argument, mapping_option
 from drivetwin.cli.output import print_line, show_step, to_error_document
 from drivetwin.errors import DrivetwinError, UnitError
 from drivetwin.findings import Finding

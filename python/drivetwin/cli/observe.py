@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.request import LOG_ENDINGS, PAGE, output_file, select_outputs
-from drivetwin.cli.arguments import TwinLogInput, read_twin_log
+from drivetwin.cli.options import TwinLogInput, read_twin_log
 from drivetwin.cli.output import show_step
 from drivetwin.errors import DamagedChannelError
 from drivetwin.report.blocks import Outcome, Tone, make_notes

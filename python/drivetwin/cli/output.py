@@ -169,7 +169,7 @@ def make_console(*, stderr: bool = False) -> Console:
     Texts are shown as they are: a unit in brackets, `[/min]`, is no markup and `:on:` no picture.
     Characters without a glyph, which a terminal might obey, are shown as escapes.
     """
-    from drivetwin._util.escaping_console import EscapingConsole
+    from drivetwin.report.text import EscapingConsole
 
     return EscapingConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.request import PAGE, Request, argument, output_file
-from drivetwin.cli.arguments import mapping_option, read_twin_log
+from drivetwin.cli.options import mapping_option, read_twin_log
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
 from drivetwin.report.blocks import Outcome

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivetwin._util.display_units import format_uncertainty
 from drivetwin._util.request import PAGE, FileRole, input_file, output_file
-from drivetwin.cli.arguments import LogInput, find_mapping
+from drivetwin.cli.options import LogInput, find_mapping
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
 from drivetwin.report.blocks import Block, Outcome, TableBlock, TextBlock, make_notes, make_table

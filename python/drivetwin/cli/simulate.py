@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivetwin._util.request import PAGE, flag, input_file, option, output_file, select_outputs
-from drivetwin.cli.arguments import (
+from drivetwin.cli.options import (
     MODEL,
     TCU_RESULT,
     TWIN,
@@ -223,9 +223,8 @@ def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) ->
 
 def _apply_parameters(twin: Twin, parameters: Path, template: Path | None) -> Twin:
     """The twin with the values of a parameter file, and what that changed on stderr."""
-    from drivetwin.export.parameters.files import read_parameters
+    from drivetwin.export.parameters.files import read_parameters, read_template, restore_entries
     from drivetwin.export.parameters.of_twin import collect_parameters
-    from drivetwin.export.parameters.template import read_template, restore_entries
     from drivetwin.export.parameters.to_twin import update_twin
 
     content = read_parameters(parameters)

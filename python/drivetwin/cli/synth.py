@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.display_units import format_uncertainty, get_display_unit
 from drivetwin._util.request import LOG_ENDINGS, Request, option, output_file, output_folder
-from drivetwin.cli.arguments import REPORT
+from drivetwin.cli.options import REPORT
 from drivetwin.cli.output import show_step, write_atomically, write_texts
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
@@ -196,7 +196,7 @@ class Demonstrate(Bench, command="demo"):
 
 def demo(request: Demonstrate) -> Outcome:
     """Identify a synthetic log with known truth by two methods, and compare."""
-    from drivetwin.cli.identify_run import IdentifyOptions, run_identification, write_outcome
+    from drivetwin.cli.identify import IdentifyOptions, run_identification, write_outcome
     from drivetwin.dyno.dyno import run as run_dyno
     from drivetwin.dyno.scenario_file import load_scenario
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from drivetwin._util.request import REQUIRED, SECOND, input_file, option, output_folder
 from drivetwin.calibration.options import ShiftOptions
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.cli.arguments import REPORT, TwinInput
 from drivetwin.cli.calibrate import compile_controller
+from drivetwin.cli.options import REPORT, TwinInput
 from drivetwin.cli.output import show_step, write_texts
 from drivetwin.report.blocks import Outcome
 

@@ -94,8 +94,14 @@ def write_content(
 
     A template gives layout and units. Without one, files of calibration tools are in bar and rpm.
     """
-    from drivetwin.export.parameters.files import ParameterFormat, show_units, write_parameters
-    from drivetwin.export.parameters.template import apply_template, read_template, require_labels
+    from drivetwin.export.parameters.files import (
+        ParameterFormat,
+        apply_template,
+        read_template,
+        require_labels,
+        show_units,
+        write_parameters,
+    )
 
     kind = ParameterFormat(options.to.value)
     if options.template is None:

@@ -17,7 +17,7 @@ from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.options import FleetOptions
 from drivetwin.fleet.pool import LocalPool, Pool, count_usable_cores
 from drivetwin.fleet.rules import RulesFile, Sources
-from drivetwin.fleet.scan import Scan, Scanned, Skipped, make_settings_document
+from drivetwin.fleet.scan import Scan, Scanned, make_settings_document
 from drivetwin.fleet.store import FileRow, Store
 from drivetwin.fleet.task import (
     IDENTIFY,
@@ -126,7 +126,7 @@ class Coordinator:
         with closing(scan.scan_files(sources, self._index.get_file)) as found:
             for one in found:
                 self._commit_if_due()
-                if isinstance(one, Skipped):
+                if one is None:
                     self._skipped += 1
                 elif not self._index.has_file_from_this_run(one.file.path):
                     self._index.set_file(one.file)

@@ -51,13 +51,6 @@ class Scanned:
     members: tuple[Member, ...] = ()
 
 
-@dataclass(frozen=True)
-class Skipped:
-    """A file that the rules leave out."""
-
-    path: str
-
-
 Known = Callable[[str], FileRow | None]
 """Looks up the index entry of a path."""
 
@@ -85,15 +78,17 @@ class Scan:
         self._recipe = lru_cache(self._read_recipe)
         self._is_bus = lru_cache(is_ratio_card)
 
-    def scan_files(self, sources: Sources, known: Known) -> Generator[Scanned | Skipped]:
+    def scan_files(self, sources: Sources, known: Known) -> Generator[Scanned | None]:
         """Every file of `sources` in their order, read a little ahead; then bus logs by vehicle.
+
+        None stands for a file that the rules leave out.
 
         `known` finds what is known of a path: a file of the same size and time of change is not
         read again. Bus logs are those that a rule reads with a card of the ratios alone.
         """
         vehicles: dict[tuple[str, str, str], list[Scanned]] = {}
         for one in self._scan_each(sources, known):
-            if isinstance(one, Scanned) and one.members:
+            if one is not None and one.members:
                 key = one.file.rule, one.file.unit, one.settings
                 vehicles.setdefault(key, []).append(one)
             else:
@@ -101,7 +96,7 @@ class Scan:
         for logs in vehicles.values():
             yield from _join_vehicle(logs)
 
-    def _scan_each(self, sources: Sources, known: Known) -> Generator[Scanned | Skipped]:
+    def _scan_each(self, sources: Sources, known: Known) -> Generator[Scanned | None]:
         waiting: deque[tuple[Source, Future[_Content]]] = deque()
         self._stop.clear()
         readers = ThreadPoolExecutor(_READERS)
@@ -117,7 +112,7 @@ class Scan:
             self._stop.set()
             readers.shutdown(cancel_futures=True)
 
-    def _scan_file(self, source: Source, reading: Future[_Content]) -> Scanned | Skipped:
+    def _scan_file(self, source: Source, reading: Future[_Content]) -> Scanned | None:
         path = _format_path(source.path)
         unit, content = "", _Content("", 0, 0)
         try:
@@ -126,7 +121,7 @@ class Scan:
             fields = self._rules.get_fields(source)
             rule = select_rule(self._rules, source, unit, lambda: _read_channel_names(source.path))
             if rule.vehicle is None:
-                return Skipped(path)
+                return None
             recipe = self._recipe(rule.vehicle, rule.channels)
             is_bus = self._is_bus(Path(rule.vehicle))
         except (OSError, DrivetwinError) as fault:

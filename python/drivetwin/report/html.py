@@ -33,8 +33,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification, Several
 from drivetwin.report.blocks import Block, FigureBlock, Page, Section, build_findings_section
 from drivetwin.report.figure import Entry, encode_entries
-from drivetwin.report.sections.identifiability import build_limits_section
-from drivetwin.report.sections.parameters import build_result_section
+from drivetwin.report.sections.parameters import build_limits_section, build_result_section
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.report.sections.summary import (
     build_actuator_section,

@@ -24,8 +24,11 @@ from drivetwin.report.figures.validation import QUANTITIES, plot_log, plot_valid
 from drivetwin.report.fit import build_fit_blocks, plot_recording
 from drivetwin.report.html import render_fragment
 from drivetwin.report.model_verdict import build_verdict_block, explain_identification
-from drivetwin.report.sections.identifiability import build_suggestion_blocks, plot_intervals
-from drivetwin.report.sections.parameters import build_parameter_blocks
+from drivetwin.report.sections.parameters import (
+    build_parameter_blocks,
+    build_suggestion_blocks,
+    plot_intervals,
+)
 from drivetwin.report.sections.summary import (
     build_fit_table,
     build_friction_table,

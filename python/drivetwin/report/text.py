@@ -1,20 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Blocks as text: in colour on a terminal, else plain."""
+"""Blocks as text, in colour on a terminal, else plain; a console that escapes what it is given."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
 from itertools import accumulate
+from typing import Any
 
 from rich import box
 from rich.cells import cell_len
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.padding import Padding
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from drivetwin._util.escaping_console import EscapingConsole
 from drivetwin._util.text import escape_text
 from drivetwin.report.blocks import (
     Block,
@@ -27,6 +28,22 @@ from drivetwin.report.blocks import (
     Tone,
     VerdictBlock,
 )
+
+
+class EscapingConsole(Console):
+    """Console whose texts contain no control characters; its own colours and lines remain."""
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Render, with the text of each segment escaped."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else escape_text(text), style, control)
+
+    def render_str(self, text: str, **options: Any) -> Any:
+        """Convert a plain text; escaped here because a text drops some control characters."""
+        return super().render_str(escape_text(text), **options)
+
 
 _STYLES = {
     Tone.PLAIN: "",

@@ -59,7 +59,7 @@ class Session:
     work: SessionState = field(default_factory=SessionState)
     job: jobs.Job | None = None
     live: Live | None = None
-    uploads: dict[str, uploads.Upload] = field(default_factory=dict)
+    uploads: dict[str, Source] = field(default_factory=dict)
     form: CardForm | None = None
     preview: tuple[ColumnKey, Preview] | None = None
     view: View | None = None
@@ -80,10 +80,9 @@ class Session:
 
     def get_uploaded(self, key: str) -> Source:
         """Return an upload by its key. Raises RefusedError if it was deleted."""
-        upload = self.uploads.get(key)
-        if upload is None:
+        if key not in self.uploads:
             raise RefusedError("this upload is no longer there", "upload the file again")
-        return Source(upload.name, upload.path, uploaded=True)
+        return self.uploads[key]
 
     def get_folder_source(self, name: str) -> Source:
         """A file of the folder. Raises RefusedError for a path that leads elsewhere."""

@@ -10,13 +10,13 @@ from __future__ import annotations
 import mmap
 import re
 import unicodedata
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from drivetwin.errors import RefusedError, Where
 from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.workbench import jobs
+from drivetwin.workbench.session_state import Source
 
 LIMITS = {
     "log": 200 * 2**20,  # ten minutes of 40 channels at 1 kHz; larger ones are opened by path
@@ -36,14 +36,6 @@ file: no part goes beyond its cell.
 _HEAD = 4096
 
 
-@dataclass(frozen=True)
-class Upload:
-    """A received file: its label and its path."""
-
-    name: str
-    path: Path
-
-
 def make_label(name: str) -> str:
     """The name that an upload is shown under. Raises RefusedError for one that is a path or none.
 
@@ -61,7 +53,7 @@ def make_label(name: str) -> str:
 
 def store_stream(
     stream: IO[bytes], name: str, claimed: int | None, target: Path, limit: int
-) -> Upload:
+) -> Source:
     """Write at most `limit` bytes of `stream` to `target`; delete the file if it is refused.
 
     `claimed` is the length that the browser states, None where it states none.
@@ -85,7 +77,7 @@ def store_stream(
     except BaseException:
         target.unlink(missing_ok=True)
         raise
-    return Upload(label, target)
+    return Source(label, target, uploaded=True)
 
 
 def refuse_formulas(path: Path, label: str) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 from drivetwin._util.optional_dependencies import handle_parser_errors
 from drivetwin.channels.roles import ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.logs.formats.can.mdf_frames import has_only_frames
+from drivetwin.logs.formats.can.open import has_only_frames
 from drivetwin.logs.formats.mdf import KIND, MdfRecording
 from drivetwin.logs.formats.mdf_conversion import scale_linear
 from drivetwin.logs.formats.mdf_integrity import HEADER4, Block, find_problems, parse_block

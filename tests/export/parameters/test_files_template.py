@@ -17,16 +17,14 @@ from drivetwin.errors import InputError
 from drivetwin.export.parameters.content import Axis, Curve, ParameterSet, Scalar
 from drivetwin.export.parameters.files import (
     ParameterFormat,
+    Template,
+    apply_template,
     read_parameters,
+    read_template,
+    restore_entries,
     write_parameters,
 )
 from drivetwin.export.parameters.of_twin import collect_parameters
-from drivetwin.export.parameters.template import (
-    Template,
-    apply_template,
-    read_template,
-    restore_entries,
-)
 from drivetwin.export.parameters.to_twin import update_twin
 from tests.export.parameters.sample import reread, twin
 
