@@ -24,7 +24,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     SyntheticVehicle,
-    TorqueError,
+    SensorErrors,
 )
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
@@ -121,7 +121,7 @@ def record_shift(made: MadeVehicle, shift: Maneuver, control: Profiles, seed: in
     pressures = {one.name: inputs[f"pressure.{one.name}"] for one in true.model.elements}
     seen = list_sampling_instants(sensors, duration)
     run = made.simulate(early, inputs["engine_torque"], pressures, seen)
-    error = TorqueError()
+    error = SensorErrors()
     channels = record_channels(
         sensors, duration, Motion(run, scenario.model.i_in, inputs, error), 1.0, seed
     )

@@ -19,7 +19,11 @@ from drivetwin.estimation.data.actuators import (
     LogShifts,
     identify_actuators,
 )
-from drivetwin.estimation.data.prepare import prepare
+from drivetwin.estimation.data.prepare import (
+    USUAL_TOLERANCES,
+    list_usual_tolerances,
+    prepare,
+)
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.direct.momentum_balance import align_output_torque
 from drivetwin.estimation.identification import Identification
@@ -192,5 +196,9 @@ def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> P
     """Prepare a log, with what is implausible on the card among its findings."""
     prepared = prepare(log, card, shifts)
     doubts = check_card(card, log, shifts.shifts)
-    noise_only = () if card.sensors else (report(Code.NO_SENSOR_TOLERANCES),)
-    return replace(prepared, findings=(*prepared.findings, *doubts, *noise_only))
+    usual = [
+        f"{name.replace('_', ' ')} {100.0 * USUAL_TOLERANCES[name].gain:g} %"
+        for name in list_usual_tolerances(log, card)
+    ]
+    assumed = [report(Code.USUAL_TOLERANCES, gains=", ".join(usual))] if usual else []
+    return replace(prepared, findings=(*prepared.findings, *doubts, *assumed))

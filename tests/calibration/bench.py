@@ -17,7 +17,7 @@ from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.dyno.scenario import Sensor
-from drivetwin.estimation.likelihood.effects.synthetic_vehicle import TorqueError
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SensorErrors
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log
 from drivetwin.shifts.detect import detect_shifts
@@ -92,7 +92,7 @@ def write_bench_log(
         "engine_torque": given.engine_torque,
         **{f"pressure.{name}": one for name, one in pressures.items()},
     }
-    motion = Motion(run, model.i_in, inputs, TorqueError())
+    motion = Motion(run, model.i_in, inputs, SensorErrors())
     channels = record_channels(SENSORS, shift.horizon, motion, 1.0, seed)
     write_log(path, tuple(convert_to_recorded_units(one) for one in channels))
     return given

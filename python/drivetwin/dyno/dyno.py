@@ -20,8 +20,8 @@ from drivetwin.dyno.truth import SENSOR_EFFECTS, Effects, Truth, check_effects, 
 from drivetwin.errors import InputError, SimulationError, Where
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     NominalRun,
+    SensorErrors,
     SyntheticVehicle,
-    TorqueError,
     compute_friction_work,
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
@@ -54,13 +54,14 @@ def changes_motion(scenario: Scenario, effects: Effects) -> bool:
 
 
 def delay_output_torque(
-    sensors: tuple[Sensor, ...], error: TorqueError, effects: Effects
+    sensors: tuple[Sensor, ...], error: SensorErrors, effects: Effects
 ) -> tuple[Sensor, ...]:
     """Return the sensors with the delay of the output torque.
 
     Raises InputError for an effect in a sensor that is absent.
     """
-    wanted = [name for name in SENSOR_EFFECTS if effects.get(name, 0.0) > 0.0]
+    of_torque = SENSOR_EFFECTS - {EffectId.SPEED_RUN_OUT}
+    wanted = [name for name in of_torque if effects.get(name, 0.0) > 0.0]
     if wanted and _ROLE not in [sensor.role for sensor in sensors]:
         raise InputError(
             f"{', '.join(sorted(wanted))}: the scenario records no output torque",
@@ -195,13 +196,13 @@ def run(
 class Motion:
     """Motion at all instants that a sensor samples, and what it does not hold.
 
-    `inputs` by role are signals beside the trajectory, `error` is that of the torque sensor.
+    `inputs` by role are signals beside the trajectory, `error` are those of the sensors.
     """
 
     trajectory: Trajectory
     i_in: float
     inputs: Mapping[str, Signal]
-    error: TorqueError
+    error: SensorErrors
 
 
 def list_sampling_instants(sensors: Sequence[Sensor], duration: float) -> FloatArray:
@@ -221,25 +222,25 @@ def record_channels(
     for sensor, generator in zip(sensors, generators, strict=True):
         stamps = sensor.compute_stamps(duration)
         exact = _compute_quantity(sensor, _compute_sampling_instants(sensor, stamps), motion)
-        exact = exact + motion.error.compute(sensor.role, stamps)
+        exact = exact + motion.error.compute(sensor.role, stamps, exact, motion.trajectory)
         channels.append(sensor.read(stamps, exact, noise, np.random.default_rng(generator)))
     return tuple(channels)
 
 
 def _compute_nominal(
     scenario: Scenario, effects: Effects, seed: int
-) -> tuple[NominalRun | None, TorqueError]:
-    """Compute the run to which effects on the motion are related, None without any, and the error
-    of the torque sensor."""
+) -> tuple[NominalRun | None, SensorErrors]:
+    """Compute the run to which effects on the motion are related, None without any, and the errors
+    of the sensors."""
     if not effects:
-        return None, TorqueError()
+        return None, SensorErrors()
     moving, given = changes_motion(scenario, effects), _build_inputs(scenario)
     grid = given.engine_torque.time
     reference, _ = _simulate(scenario, given, grid[grid <= scenario.duration])
     nominal = NominalRun(scenario.model, reference, given.engine_torque, given.pressures)
     gears = [gear.element for gear in scenario.gears]
     sensor = {name: size for name, size in effects.items() if name in SENSOR_EFFECTS}
-    error = apply_effects(nominal, sensor, gears, seed).output_torque
+    error = apply_effects(nominal, sensor, gears, seed).errors
     return nominal if moving else None, error
 
 

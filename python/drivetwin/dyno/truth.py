@@ -29,7 +29,7 @@ Effects = Mapping[EffectId, float]
 """Sizes by effect, in the units of its entry; an effect of size 0 changes nothing."""
 
 SENSOR_EFFECTS = frozenset(name for name, one in EFFECTS.items() if one.on_sensor)
-"""Effects that change the recorded output torque and leave the motion as it is."""
+"""Effects that change recorded outputs and leave the motion as it is."""
 _LIMITS = {name: one.limit for name, one in EFFECTS.items() if one.limit < math.inf}
 _KEY = Where(key="effect")
 

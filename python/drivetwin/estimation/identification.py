@@ -27,7 +27,7 @@ from drivetwin.estimation.result.estimate import (
 )
 from drivetwin.estimation.result.estimate_set import JointCovariance
 from drivetwin.estimation.result.method import Method, ModelStatus
-from drivetwin.estimation.result.verdict import adopt_verdicts, find_limit
+from drivetwin.estimation.result.verdict import adopt_verdicts
 from drivetwin.findings import Code, Finding, report
 from drivetwin.shifts.shift import RejectedShift, Shift
 
@@ -210,13 +210,6 @@ class Identification(EstimatesMixin):
     def __post_init__(self) -> None:
         """Keep the verdict of each friction curve that of its μ times gain."""
         object.__setattr__(self, "friction", adopt_verdicts(self.friction, self.estimates))
-
-    @property
-    def limit(self) -> Code:
-        """Finding on an interval that more data of the same kind do not narrow."""
-        return find_limit(
-            tolerances=all(one.code is not Code.NO_SENSOR_TOLERANCES for one in self.findings)
-        )
 
     def has_own_friction(self, element: str) -> bool:
         """Return True if the log determines the friction of an element."""

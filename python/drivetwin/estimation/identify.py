@@ -294,8 +294,6 @@ def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet)
         texts.append(ONE_MODEL)
     if design.loss_law == "dissipative":
         texts.append(ALL_BEFORE_LOSS)
-    if not design.sensors:
-        texts.append("no sensor tolerance is stated: intervals contain no constant sensor errors")
     texts += [
         f"known beforehand: {name} = "
         f"{format_with_unit(prior.value, get_parameter_spec(name).unit, prior.std)}"

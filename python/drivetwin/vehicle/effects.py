@@ -35,6 +35,9 @@ class EffectId(StrEnum):
     FRICTION_SHAPE = "friction_shape"
     FRICTION_PRESSURE = "friction_pressure"
     FRICTION_HEAT = "friction_heat"
+    TORQUE_MAP = "torque_map"
+    OUTPUT_TORQUE_CURVE = "output_torque_curve"
+    SPEED_RUN_OUT = "speed_run_out"
 
 
 @dataclass(frozen=True)

@@ -358,7 +358,7 @@ class PressureSensor(SensorTable):
 
 
 class SensorsTable(StrictModel):
-    """`[sensors]`: tolerances by channel role; none stated means that only noise is counted."""
+    """`[sensors]`: tolerances by channel role; a torque without one has the usual gain error."""
 
     engine_torque: EngineTorqueSensor | None = None
     output_torque: TorqueSensor | None = None

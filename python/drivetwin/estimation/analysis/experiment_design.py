@@ -397,7 +397,6 @@ class _Linearisation:
     fit: LikelihoodFit
     values: Mapping[str, float]
     jacobian: FloatArray
-    limit: Code
     """Finding on an interval that more data do not narrow."""
 
     def get_row(self, name: str, names: tuple[str, ...]) -> FloatArray:
@@ -419,7 +418,7 @@ def _linearise(found: Identification) -> _Linearisation:
         return compute_parameters(fit.problem, at, signals, slips)
 
     slopes = differentiate(compute, fit.point, np.sqrt(np.diag(fit.covariance)))
-    return _Linearisation(fit, compute(fit.point), slopes, found.limit)
+    return _Linearisation(fit, compute(fit.point), slopes)
 
 
 def _rank_for_parameter(
@@ -431,7 +430,7 @@ def _rank_for_parameter(
         return ExperimentRanking(one.id, one.verdict, half, (), NO_SCALE)
     systematic = one.std_systematic or 0.0
     if one.std_noise is not None and is_limited(one.std_noise, systematic):
-        return ExperimentRanking(one.id, one.verdict, half, (), explain(base.limit))
+        return ExperimentRanking(one.id, one.verdict, half, (), explain(Code.SENSOR_LIMITED))
     names = _add_delay(fit).names
     row = base.get_row(one.id, names)
     if not row.any():  # specific to another log

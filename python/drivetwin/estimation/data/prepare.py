@@ -399,12 +399,27 @@ def collect_tolerances(
     return _collect_tolerances(log, refer_to_turbine(log, card, shift), card)
 
 
+USUAL_TOLERANCES = {
+    "engine_torque": SensorTolerance(gain=0.01),
+    "output_torque": SensorTolerance(gain=0.005),
+}
+"""Tolerances of torque sensors of which the card states none: calibrated torque models of engine
+controllers are within a few per cent, installed torque meters within 0.1 to 1 % of reading."""
+
+
+def list_usual_tolerances(log: ShiftLog, card: VehicleCard) -> list[str]:
+    """List the roles of a log whose sensors have a usual tolerance, because the card has none."""
+    return [one for one in USUAL_TOLERANCES if one in log and one not in card.sensors]
+
+
 def _collect_tolerances(
     log: ShiftLog, referred: ShiftLog, card: VehicleCard
 ) -> dict[str, SensorTolerance]:
     """Return the tolerances of a log; `referred` is the log behind an open converter."""
     read = "engine_speed" if "engine_speed" in referred else "input_speed"
-    found = {role: one for role, one in card.sensors.items() if role not in ENGINE_SPEEDS}
+    usual = {one: USUAL_TOLERANCES[one] for one in list_usual_tolerances(log, card)}
+    stated = {role: one for role, one in card.sensors.items() if role not in ENGINE_SPEEDS}
+    found = usual | stated
     if read in card.sensors:
         one, factor = card.sensors[read], card.i_in.value if read == "input_speed" else 1.0
         found["engine_speed"] = replace(one, offset=factor * one.offset)

@@ -81,7 +81,6 @@ from drivetwin.estimation.result.verdict import (
     apply_errors,
     assess_friction,
     compute_correlation,
-    name_limits,
     refuse_parameter,
     report_gains,
 )
@@ -212,9 +211,7 @@ def build_estimates(
         scale, contradicted = find_scale(over_eta, drivelines[0].known)
         absolute = list_absolute_ids(signals)
         estimates |= estimate_absolute(absolute, over_eta, scale, drivelines[0])
-    estimates = name_limits(
-        {**estimates, **_estimate_delays(fit, drivelines)}, tolerances=bool(priors.sensors)
-    )
+    estimates |= _estimate_delays(fit, drivelines)
     loads = tuple((1.0 if scale is None else scale.eta) * one for one in collect_loads(fit))
     curves = adopt_verdicts(curves, estimates)
     return EstimateSet(

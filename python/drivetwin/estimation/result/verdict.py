@@ -78,22 +78,6 @@ def get_experiment(parameter_id: str, declared: ParameterSpec | None = None) -> 
     return _ANY_EXPERIMENT if declared else _EXPERIMENT[get_parameter_spec(parameter_id).stem]
 
 
-def find_limit(*, tolerances: bool) -> Code:
-    """Return the finding on an interval that more data do not narrow, of a card with sensor
-    `tolerances` or without."""
-    return Code.SENSOR_LIMITED if tolerances else Code.EFFECT_LIMITED
-
-
-def name_limits(estimates: Mapping[str, Estimate], *, tolerances: bool) -> dict[str, Estimate]:
-    """Return the estimates with reasons that name the sensors only where the card states their
-    `tolerances`."""
-    general, found = explain(Code.SENSOR_LIMITED), explain(find_limit(tolerances=tolerances))
-    return {
-        name: replace(one, reason=one.reason.replace(general, found))
-        for name, one in estimates.items()
-    }
-
-
 def is_limited(std_noise: float, std_systematic: float | None) -> bool:
     """Return True if sensor tolerances and effects that the model leaves out dominate an interval.
 
@@ -108,11 +92,10 @@ def get_advice(
     std_noise: float,
     std_systematic: float | None,
     declared: ParameterSpec | None = None,
-    limit: Code = Code.SENSOR_LIMITED,
 ) -> str:
-    """Return advice on narrowing an interval: an experiment, or `limit` where more data do not."""
+    """Return advice on narrowing an interval: an experiment, or the reason why none does."""
     if is_limited(std_noise, std_systematic):
-        return explain(limit)
+        return explain(Code.SENSOR_LIMITED)
     return get_experiment(parameter_id, declared)
 
 

@@ -53,7 +53,7 @@ def build_card_tables(card: VehicleCard) -> list[TableBlock]:
         ("Inertia of the vehicle J3", f"{least:.4g} to {most:.4g} kg·m²"),
         (
             "Sensor tolerances",
-            ", ".join(card.sensors) or "none: intervals contain no constant sensor errors",
+            ", ".join(card.sensors) or "none: usual ones of the torques",
         ),
     ]
     if card.J_out is not None:

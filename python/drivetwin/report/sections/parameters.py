@@ -388,7 +388,7 @@ def _build_uncertainty_tables(found: Identification) -> Iterator[TableBlock]:
         interval = f"± {format_significant(width, 2)} %"
         share, advice = (
             _describe_sensor_share(one),
-            (get_advice(one.id, one.std_noise or 0.0, one.std_systematic, limit=found.limit)),
+            get_advice(one.id, one.std_noise or 0.0, one.std_systematic),
         )
         rows.append((make_parameter_cell(name), interval, share, advice))
     columns = (

@@ -184,7 +184,7 @@ class Effect:
     limit: float = math.inf
     """Size in a synthetic log from which a torque would reverse or a share exceed the whole."""
     on_sensor: bool = False
-    """True where the effect changes the recorded output torque and leaves the motion as it is."""
+    """True where the effect changes recorded outputs and leaves the motion as it is."""
 
     def scale_amount(self, amount: float, std: float) -> float:
         """Return the size of an `amount`, in units of the columns, of the stated size `std`."""
@@ -218,6 +218,7 @@ class WalkStream(IntEnum):
 
     LOAD = 101
     OUTPUT_TORQUE = 102
+    TORQUE_MAP = 103
 
 
 def draw_walk(stream: WalkStream, seed: int, duration: float) -> Signal:

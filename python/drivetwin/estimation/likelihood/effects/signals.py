@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Effects in signals: inputs that act at other times than they are logged, errors of a sensor."""
+"""Effects in inputs: other times and other torques than logged."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, apply_lag
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE, TORQUE
+from drivetwin.estimation.likelihood.data.torque_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     Effect,
@@ -115,101 +115,41 @@ TORQUE_LAG = Effect(
 )
 
 
-def build_output_torque_offset(at: OperatingPoint, std: float) -> list[Disturbance]:
-    """Add a constant to the output torque."""
-    offset = np.full(at.run.time.size, std * at.largest_shaft_torque)
-    return [Disturbance(outputs={OUTPUT_TORQUE: offset})]
+MAP_COUNT = 4
+"""Columns of the error of a torque map: waves of at least half the range of the torque."""
 
 
-def apply_output_torque_offset(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
-    """Add the offset to the error of the sensor."""
-    error = vehicle.output_torque
-    offset = error.offset + size * vehicle.nominal.largest_shaft_torque
-    return replace(vehicle, output_torque=replace(error, offset=offset))
+def build_torque_map(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Add a random walk over the range of the engine torque, less its mean, to the torque."""
+    low, high = at.engine_torque.min(), at.engine_torque.max()
+    share = (at.engine_torque - low) / max(high - low, 1e-9)
+    growth = std * at.largest_engine_torque
+    columns = build_random_walk(share, MAP_COUNT, growth)
+    return [Disturbance(inputs={TORQUE: -column}) for column in columns]
 
 
-OUTPUT_TORQUE_OFFSET = Effect(
-    EffectId.OUTPUT_TORQUE_OFFSET,
-    "an offset of the output torque",
-    "of the largest shaft torque",
-    0.001,
-    "typical range of the zero error of torque flanges and telemetry, 0.1 to 0.3 % of full scale",
-    "zero the output torque sensor with the driveline unloaded",
-    build_output_torque_offset,
-    apply_output_torque_offset,
-    on_sensor=True,
-)
+def apply_torque_map(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
+    """Add a random walk over the range of the logged engine torque to the acting one."""
+    logged = vehicle.engine_torque
+    walk = draw_walk(WalkStream.TORQUE_MAP, vehicle.seed, 1.0)
+    low, high = logged.values.min(), logged.values.max()
+    share = (logged.values - low) / max(high - low, 1e-9)
+    error = size * vehicle.nominal.largest_engine_torque * np.interp(share, walk.time, walk.values)
+    return replace(vehicle, engine_torque=replace(logged, values=logged.values + error))
 
 
-COUNT = 4
-"""Columns of the walk: drift slower than an eighth of the span is what moves parameters."""
-REFERENCE_S = 5.0
-"""Time [s] over which the prior states the drift."""
-
-
-def build_output_torque_drift(at: OperatingPoint, std: float) -> list[Disturbance]:
-    """Add a random walk to the output torque of the shift."""
-    growth = std * at.largest_shaft_torque * float(np.sqrt(at.duration / REFERENCE_S))
-    columns = build_random_walk(at.progress, COUNT, growth)
-    label = at.describe_shift()
-    return [Disturbance(label, outputs={OUTPUT_TORQUE: column}) for column in columns]
-
-
-def apply_output_torque_drift(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
-    """Add a random walk to the error of the sensor."""
-    duration = float(vehicle.nominal.trajectory.time[-1])
-    walk = draw_walk(WalkStream.OUTPUT_TORQUE, vehicle.seed, duration)
-    scale = size * vehicle.nominal.largest_shaft_torque / np.sqrt(REFERENCE_S)
-    drift = Signal(walk.time, scale * walk.values)
-    return replace(vehicle, output_torque=replace(vehicle.output_torque, drift=drift))
-
-
-OUTPUT_TORQUE_DRIFT = Effect(
-    EffectId.OUTPUT_TORQUE_DRIFT,
-    "a drift of the output torque",
-    "of the largest shaft torque over 5 s",
-    0.003,
-    "typical range of strain gauges on a shaft by warm-up and bending crosstalk, 0.1 to 0.5 % of "
-    "full scale",
-    "let the torque sensor warm up and compare its zero before and after the recording",
-    build_output_torque_drift,
-    apply_output_torque_drift,
+TORQUE_MAP = Effect(
+    EffectId.TORQUE_MAP,
+    "an error of the engine torque over its own value",
+    "of the largest engine torque",
+    0.01,
+    "engineering estimate: torque models of engine controllers and maps between their points, of "
+    "the order of one per cent over the range",
+    "compare the engine torque with a torque meter at several loads",
+    build_torque_map,
+    apply_torque_map,
     random=True,
-    on_sensor=True,
 )
 
 
-def build_output_torque_delay(at: OperatingPoint, std: float) -> list[Disturbance]:
-    """Delay the simulated output torque; the speeds are the reference clock."""
-    time, torque = at.run.time, at.run.shaft_torque
-    return [Disturbance(outputs={OUTPUT_TORQUE: np.interp(time - std, time, torque) - torque})]
-
-
-def apply_output_torque_delay(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
-    """Delay the sensor."""
-    return replace(vehicle, output_torque=replace(vehicle.output_torque, delay=size))
-
-
-OUTPUT_TORQUE_DELAY = Effect(
-    EffectId.OUTPUT_TORQUE_DELAY,
-    "a delay of the output torque against the speeds",
-    "s",
-    0.003,
-    "typical range of anti-aliasing filters and telemetry of torque sensors, 1 to 5 ms",
-    "set channels.output_torque.time_shift_s in the channel mapping and compare",
-    build_output_torque_delay,
-    apply_output_torque_delay,
-    curved=True,
-    signed=True,
-    on_sensor=True,
-    negative="negative: the output torque is early",
-)
-
-
-EFFECTS = (
-    PRESSURE_DELAY,
-    TORQUE_LAG,
-    OUTPUT_TORQUE_OFFSET,
-    OUTPUT_TORQUE_DRIFT,
-    OUTPUT_TORQUE_DELAY,
-)
+EFFECTS = (PRESSURE_DELAY, TORQUE_LAG, TORQUE_MAP)

@@ -84,23 +84,36 @@ def compute_friction_work(run: Trajectory, element: str) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueError:
-    """Error of the output torque sensor: `offset` and `drift` [N m], `delay` [s]."""
+class SensorErrors:
+    """Errors of recorded outputs.
+
+    Those of the output torque are `offset` and `drift` [N m], `delay` [s] and `curve` [1/(N m)],
+    an error in proportion to the square of the torque. `run_out` is the amplitude of the error of
+    the speed at the engine once per turn, over the speed.
+    """
 
     offset: float = 0.0
     drift: Signal | None = None
     delay: float = 0.0
+    curve: float = 0.0
+    run_out: float = 0.0
 
-    def compute(self, role: str, stamps: FloatArray) -> FloatArray:
-        """Compute the error (n,) [N m] of a channel at its `stamps` (n,) [s]; 0 for other roles.
+    def compute(
+        self, role: str, stamps: FloatArray, exact: FloatArray, run: Trajectory
+    ) -> FloatArray:
+        """Compute the error (n,) of a channel with `exact` values (n,) at its `stamps` (n,) [s] in
+        a run; 0 for other roles.
 
         The delay is not part of it.
         """
+        if role in ("input_speed", "engine_speed"):
+            angle = integrate_trapezoids(run.engine_speed, run.time)
+            return np.asarray(self.run_out * exact * np.sin(np.interp(stamps, run.time, angle)))
         if role != "output_torque":
             return np.zeros_like(stamps)
         drift = self.drift
         walk = 0.0 if drift is None else np.interp(stamps, drift.time, drift.values)
-        return np.asarray(np.full_like(stamps, self.offset) + walk)
+        return np.asarray(self.offset + walk + self.curve * exact * np.abs(exact))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +122,7 @@ class SyntheticVehicle:
 
     `nominal` is the run without effects, `gears` are the shift elements in the order of the gears,
     `seed` is that of the random effects. `model` and `added` describe the vehicle, `engine_torque`
-    [N m] and `pressures` [Pa] act on it, `output_torque` is the error of its sensor. Friction
+    [N m] and `pressures` [Pa] act on it, `errors` are those of the sensors. Friction
     depends on the work of the run `heated`, which has the times of the nominal one.
     """
 
@@ -121,7 +134,7 @@ class SyntheticVehicle:
     pressures: Mapping[str, Signal]
     heated: Trajectory
     added: AddedElements = NO_ADDED_ELEMENTS
-    output_torque: TorqueError = TorqueError()
+    errors: SensorErrors = SensorErrors()
 
     @classmethod
     def from_nominal(
