@@ -152,6 +152,8 @@ class PlantEffect:
 
 COMMON = ("eta", "J_e", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "te_delay")
 """Unknowns of the driveline, the same in all shifts."""
+SHAFT = ("k_o", "c_o")
+"""Unknowns of the output shaft: its stiffness and damping."""
 TE_OFFSET = "te_offset"
 """Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
 LOG_SPECIFIC = ("Tv_over_if", "te_delay", TE_OFFSET)

@@ -39,6 +39,7 @@ from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,
     LOAD_DEVIATION,
+    SHAFT,
     START,
     TE_OFFSET,
     DualClutchPlant,
@@ -110,6 +111,9 @@ _GEAR_INERTIA = "J_prime_"
 DESIGN_FACTOR = 10.0
 """Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
 small that, with the shaft's damping, one run takes as long as a whole fit."""
+SHAFT_REACH = 30.0
+"""Factor to either side of the first stiffness and damping within which they are sought: 5.5 in
+frequency. Farther off a run is stiff and takes a hundred times as long."""
 RATIO_REACH = 10.0
 """Distance from its nominal value within which a ratio is sought, in standard deviations of the
 card's number: the speeds show it far better, and far off the elements would have other signs."""
@@ -186,7 +190,7 @@ def build_problem(
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
     start |= {n: guess.get(n, 0.0) for each in load_factors.values() for n in each}
     begin = ParameterVector(tuple(start), np.array(list(start.values())))
-    lower, upper = _restrict_to_design(get_bounds(begin.names), begin, priors)
+    lower, upper = _restrict_to_reach(get_bounds(begin.names), begin, priors)
     point = begin.replace_values(np.clip(begin.values, lower, upper))
     entries = {
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
@@ -260,13 +264,17 @@ def get_bounds(names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     return lower, upper
 
 
-def _restrict_to_design(
+def _restrict_to_reach(
     bounds: tuple[FloatArray, FloatArray], start: ParameterVector, priors: Mapping[str, PriorValue]
 ) -> tuple[FloatArray, FloatArray]:
-    """Restrict the bounds of Jo′ to a factor about its design value, if the card has one, and those
-    of ratios to a reach about their nominal values."""
+    """Restrict the bounds of Jo′ to a factor about its design value, if the card has one, those of
+    the shaft to one about their first values, and those of ratios to a reach about their nominal
+    values."""
     lower, upper = bounds
     for k, name in enumerate(start.names):
+        if name in SHAFT and start.values[k] > 0.0:
+            lower[k] = max(lower[k], start.values[k] / SHAFT_REACH)
+            upper[k] = min(upper[k], start.values[k] * SHAFT_REACH)
         if is_ratio(name):
             reach = RATIO_REACH * priors[name].std
             lower[k], upper[k] = start.values[k] - reach, start.values[k] + reach

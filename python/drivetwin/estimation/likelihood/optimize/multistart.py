@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -16,11 +17,12 @@ from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_covarianc
 from drivetwin.estimation.likelihood.optimize.search import (
     SEARCH,
     Attempts,
+    compute_misfit,
     expect_inputs,
     is_near,
     refine_draws,
 )
-from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
+from drivetwin.estimation.likelihood.parametrization import SHAFT, DualClutchProblem
 from drivetwin.estimation.likelihood.term import RecordedTerm
 from drivetwin.estimation.optimize.gauss_newton import minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
@@ -94,6 +96,34 @@ def find_near_point(problem: DualClutchProblem, start: ParameterVector) -> Param
         if attempts.agreeing > 1 or attempts.chi2 < MULTI_START.doubtful_chi2:
             break
     return attempts.best.point if attempts.chi2 < SEARCH.near_chi2 else None
+
+
+STIFFNESS = 10.0 ** np.linspace(-1.0, 1.0, 9)
+"""Factors of the stiffness of the shaft over which Q is scanned: a third in frequency apart [-]."""
+DAMPING = (0.1, 0.3, 1.0, 3.0)
+"""Factors of the damping ratio over which Q is scanned [-]."""
+
+
+def scan_shaft(problem: DualClutchProblem, start: ParameterVector) -> ParameterVector:
+    """Return the best start over frequencies and damping ratios of the shaft; a start that is not
+    doubtful stays.
+
+    Q has a minimum for each number of periods of the oscillation. One that decays within few
+    samples gives a rough first frequency.
+    """
+    if not set(SHAFT) <= set(start.names) or not is_doubtful(problem, start):
+        return start
+    k_o, c_o = (start.names.index(name) for name in SHAFT)
+    points = [start]
+    for stiffness, damping in product(STIFFNESS.tolist(), DAMPING):
+        values = start.values.copy()
+        values[k_o] *= stiffness
+        values[c_o] *= damping * np.sqrt(stiffness)
+        for k, name in enumerate(start.names):
+            if name.endswith(".twist"):
+                values[k] /= stiffness
+        points.append(start.replace_values(np.clip(values, problem.lower, problem.upper)))
+    return min(points, key=lambda one: compute_misfit(problem, one))
 
 
 def compute_spread(problem: DualClutchProblem, start: ParameterVector) -> FloatArray:

@@ -199,14 +199,14 @@ class _Screen:
             draws[0] = self.start.values
         draws = np.clip(draws, self.problem.lower, self.problem.upper)
         points = [self.start.replace_values(one) for one in draws]
-        scores = np.array([_compute_misfit(self.problem, one) for one in points])
+        scores = np.array([compute_misfit(self.problem, one) for one in points])
         self.draws = np.concatenate([self.draws, draws])
         self.scores = np.concatenate([self.scores, scores])
         order = np.argsort(scores, kind="stable")[: SEARCH.round_starts]
         return [points[k] for k in order if np.isfinite(scores[k])]
 
 
-def _compute_misfit(problem: LikelihoodObjective[Any], point: ParameterVector) -> float:
+def compute_misfit(problem: LikelihoodObjective[Any], point: ParameterVector) -> float:
     """Compute -2 log likelihood with a noise of each output that is unknown beyond that of its
     sensor; infinite where the run fails."""
     charge(RUN)

@@ -39,6 +39,7 @@ from drivetwin.estimation.likelihood.optimize.multistart import (
     fit_multistart,
     is_doubtful,
     refine,
+    scan_shaft,
 )
 from drivetwin.estimation.likelihood.optimize.search import find_best_draw
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
@@ -194,6 +195,7 @@ def fit_candidates(problem: DualClutchProblem, start: ParameterVector) -> Likeli
 
     Raises IdentificationError where it does not converge with the likeliest modes.
     """
+    start = scan_shaft(problem, start)
     near, likely, other = select_sampling_mode(problem, start)
     draws = near is start or not is_doubtful(problem, near)
     best = _try_fit(likely, near, draws) or fit_multistart(other, near, draws=draws)
