@@ -39,7 +39,6 @@ from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,
     LOAD_DEVIATION,
-    SHAFT,
     START,
     TE_OFFSET,
     DualClutchPlant,
@@ -111,9 +110,10 @@ _GEAR_INERTIA = "J_prime_"
 DESIGN_FACTOR = 10.0
 """Factor to either side of the card's Jo′ within which it is sought. Only this inertia may be so
 small that, with the shaft's damping, one run takes as long as a whole fit."""
-SHAFT_REACH = 30.0
+SHAFT_REACH: Mapping[str, float] = {"k_o": 30.0, "c_o": 10.0}
 """Factor to either side of the first stiffness and damping within which they are sought: 5.5 in
-frequency. Farther off a run is stiff and takes a hundred times as long."""
+frequency, and beyond any oscillation. Farther off a run is stiff and takes a hundred times as
+long."""
 RATIO_REACH = 10.0
 """Distance from its nominal value within which a ratio is sought, in standard deviations of the
 card's number: the speeds show it far better, and far off the elements would have other signs."""
@@ -272,9 +272,9 @@ def _restrict_to_reach(
     values."""
     lower, upper = bounds
     for k, name in enumerate(start.names):
-        if name in SHAFT and start.values[k] > 0.0:
-            lower[k] = max(lower[k], start.values[k] / SHAFT_REACH)
-            upper[k] = min(upper[k], start.values[k] * SHAFT_REACH)
+        if name in SHAFT_REACH and start.values[k] > 0.0:
+            lower[k] = max(lower[k], start.values[k] / SHAFT_REACH[name])
+            upper[k] = min(upper[k], start.values[k] * SHAFT_REACH[name])
         if is_ratio(name):
             reach = RATIO_REACH * priors[name].std
             lower[k], upper[k] = start.values[k] - reach, start.values[k] + reach

@@ -61,6 +61,9 @@ class InitialGuessSettings:
     """Factor beyond the design range of J3 from which the balance of the vehicle counts as wrong:
     without a wheel speed the swing of a soft shaft hides how little the vehicle changes its speed
     [ratio]."""
+    max_damping: float = 0.2
+    """Largest damping ratio of the shaft, that of a damped propeller shaft: few samples of a short
+    oscillation give larger ones [-]."""
     ringdown: tuple[float, float] = (0.05, 0.8)
     """Start and end, after lock-up, of the stretch in which the shaft oscillation is sought [s]."""
 
@@ -226,7 +229,8 @@ def _estimate_mode(signals: ShiftSignals, driveline: KnownDriveline) -> tuple[fl
         time, twist_rate = drop_nan_rows(time, twist_rate)
         trend = np.vander(time - time[0], 3)
         rest = twist_rate - trend @ np.linalg.lstsq(trend, twist_rate, rcond=None)[0]
-        return estimate_pencil_start(time, rest)
+        decay, omega = estimate_pencil_start(time, rest)
+        return min(decay, GUESS.max_damping * omega), omega
     except IdentificationError:
         omega, zeta = TYPICAL_MODE
         return zeta * omega, omega

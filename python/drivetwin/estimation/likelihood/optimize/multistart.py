@@ -100,7 +100,7 @@ def find_near_point(problem: DualClutchProblem, start: ParameterVector) -> Param
 
 STIFFNESS = 10.0 ** np.linspace(-1.0, 1.0, 9)
 """Factors of the stiffness of the shaft over which Q is scanned: a third in frequency apart [-]."""
-DAMPING = (0.1, 0.3, 1.0, 3.0)
+DAMPING = (0.15, 0.4, 1.0, 2.0)
 """Factors of the damping ratio over which Q is scanned [-]."""
 
 
