@@ -23,8 +23,8 @@ from drivetwin.channels.roles import get_command_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
-    SyntheticVehicle,
     SensorErrors,
+    SyntheticVehicle,
 )
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import convert_to_recorded_units, write_log

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import get_pressure_element
@@ -21,16 +22,18 @@ Change = Callable[[DynoRun, Channel, float], FloatArray]
 class UnlistedId(StrEnum):
     """Mismatches that the table of effects does not contain, with the meaning of their size."""
 
-    TORQUE_MAP = "torque_map"
-    """Amplitude of a wave in the engine torque over its true value."""
     PRESSURE_HYSTERESIS = "pressure_hysteresis"
     """Half of the play between acting and recorded clutch pressures [Pa]."""
     PRESSURE_CURVATURE = "pressure_curvature"
     """Error of a pressure sensor at the middle of its range, over the range."""
-    TORQUE_SENSOR_CURVATURE = "torque_sensor_curvature"
-    """Error of the output torque sensor at the largest torque, over that torque."""
-    SPEED_RUN_OUT = "speed_run_out"
-    """Amplitude of the error once per turn of the input speed, over the speed."""
+    PRESSURE_STEP = "pressure_step"
+    """Step of the recorded clutch pressures [Pa]."""
+    FIRING_ORDER = "firing_order"
+    """Amplitude of the ripple of the input speed three times per turn, over the speed."""
+    CLOCK_DRIFT = "clock_drift"
+    """Error of the rate of the clock of the output torque."""
+    TORQUE_FILTER = "torque_filter"
+    """Delay of a Butterworth filter of order two in the output torque [s]."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +42,6 @@ class Unlisted:
 
     std: float
     change: Change
-
-
-def _bend_torque_map(_: DynoRun, channel: Channel, size: float) -> FloatArray:
-    if channel.role != "engine_torque":
-        return channel.values
-    largest = float(np.max(np.abs(channel.values)))
-    return channel.values * (1.0 + size * np.sin(2.0 * np.pi * channel.values / largest + 1.0))
 
 
 def _add_play(recorded: DynoRun, channel: Channel, size: float) -> FloatArray:
@@ -77,28 +73,45 @@ def _bend_pressure(_: DynoRun, channel: Channel, size: float) -> FloatArray:
     return channel.values + 4.0 * size * full * share * (1.0 - share)
 
 
-def _bend_output_torque(_: DynoRun, channel: Channel, size: float) -> FloatArray:
-    if channel.role != "output_torque":
+def _round_pressure(_: DynoRun, channel: Channel, size: float) -> FloatArray:
+    if get_pressure_element(channel.role) is None or size == 0.0:
         return channel.values
-    largest = float(np.max(np.abs(channel.values)))
-    return channel.values + size * channel.values * np.abs(channel.values) / largest
+    return np.asarray(size * np.round(channel.values / size), dtype=np.float64)
 
 
-def _add_run_out(recorded: DynoRun, channel: Channel, size: float) -> FloatArray:
+def _add_firing(recorded: DynoRun, channel: Channel, size: float) -> FloatArray:
     if channel.role != "input_speed":
         return channel.values
     motion = recorded.trajectory
     steps = np.diff(motion.time) * 0.5 * (motion.engine_speed[1:] + motion.engine_speed[:-1])
     angle = np.interp(channel.time, motion.time, np.concatenate(([0.0], np.cumsum(steps))))
-    return channel.values * (1.0 + size * np.sin(angle))
+    return channel.values * (1.0 + size * np.sin(3.0 * angle))
+
+
+def _stretch_time(_: DynoRun, channel: Channel, size: float) -> FloatArray:
+    if channel.role != "output_torque":
+        return channel.values
+    acting = channel.time[0] + (1.0 - size) * (channel.time - channel.time[0])
+    return np.interp(acting, channel.time, channel.values)
+
+
+def _filter_torque(_: DynoRun, channel: Channel, size: float) -> FloatArray:
+    if channel.role != "output_torque" or size == 0.0:
+        return channel.values
+    rate = (channel.time.size - 1) / float(np.ptp(channel.time))
+    corner = min(np.sqrt(2.0) / (2.0 * np.pi * size), 0.45 * rate)
+    sections = butter(2, corner, fs=rate, output="sos")
+    state = sosfilt_zi(sections) * channel.values[0]
+    return np.asarray(sosfilt(sections, channel.values, zi=state)[0])
 
 
 UNLISTED: dict[UnlistedId, Unlisted] = {
-    UnlistedId.TORQUE_MAP: Unlisted(0.01, _bend_torque_map),
     UnlistedId.PRESSURE_HYSTERESIS: Unlisted(5e3, _add_play),
     UnlistedId.PRESSURE_CURVATURE: Unlisted(0.005, _bend_pressure),
-    UnlistedId.TORQUE_SENSOR_CURVATURE: Unlisted(0.01, _bend_output_torque),
-    UnlistedId.SPEED_RUN_OUT: Unlisted(5e-4, _add_run_out),
+    UnlistedId.PRESSURE_STEP: Unlisted(5e3, _round_pressure),
+    UnlistedId.FIRING_ORDER: Unlisted(1e-3, _add_firing),
+    UnlistedId.CLOCK_DRIFT: Unlisted(5e-4, _stretch_time),
+    UnlistedId.TORQUE_FILTER: Unlisted(3e-3, _filter_torque),
 }
 """Sizes of good workshop equipment; engineering estimates."""
 

@@ -113,11 +113,12 @@ def test_unlisted_mismatch_changes_its_own_channels_alone(which: UnlistedId) -> 
     changed = {a.role for a, b in pairs if not np.array_equal(a.values, b.values)}
     pressures = {"pressure.B2", "pressure.B3"}
     expected = {
-        UnlistedId.TORQUE_MAP: {"engine_torque"},
         UnlistedId.PRESSURE_HYSTERESIS: pressures,
         UnlistedId.PRESSURE_CURVATURE: pressures,
-        UnlistedId.TORQUE_SENSOR_CURVATURE: {"output_torque"},
-        UnlistedId.SPEED_RUN_OUT: {"input_speed"},
+        UnlistedId.PRESSURE_STEP: pressures,
+        UnlistedId.FIRING_ORDER: {"input_speed"},
+        UnlistedId.CLOCK_DRIFT: {"output_torque"},
+        UnlistedId.TORQUE_FILTER: {"output_torque"},
     }
     assert changed == expected[which]
     assert wrong.truth is recorded.truth
