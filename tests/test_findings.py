@@ -103,7 +103,9 @@ def test_equal_findings_are_one_text_with_their_number_and_the_worst() -> None:
     (text,) = render(shifts)
     assert text.startswith("Shift 4 contradicts" if text[0] == "S" else "shift 4 contradicts")
     assert text.endswith("(5 of this kind; also shift 2, shift 3, shift 2.5 and 1 more)")
-    files = [report(Code.USUAL_TOLERANCES, gains="x").set_file(name) for name in ("a.csv", "b.csv")]
+    files = [
+        report(Code.NO_SENSOR_TOLERANCES, gains="x").set_file(name) for name in ("a.csv", "b.csv")
+    ]
     (text,) = render(files)
     assert text.startswith("a.csv: ")
     assert text.endswith("(2 of this kind; also b.csv)")

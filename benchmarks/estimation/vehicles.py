@@ -263,6 +263,7 @@ def _draw_card(rng: np.random.Generator, drive: Scenario) -> str:
     model = drive.model
     value = model.J_out * (1.0 + J_out * float(rng.standard_normal()))
     card = tomlkit.parse(format_card(drive)).unwrap()
+    del card["sensors"]  # a user seldom states them
     card["inertia"]["J_out_kgm2"] = {"value": value, "std": J_out * value}
     for one in model.elements:
         entry = card["elements"][one.name]

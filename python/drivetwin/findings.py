@@ -175,7 +175,7 @@ class Code(StrEnum):
     CARD_FRICTION_BOUND = auto()
     CARD_INERTIA_DIFFERS = auto()
     CARD_NOT_COMPARED = auto()
-    USUAL_TOLERANCES = auto()
+    NO_SENSOR_TOLERANCES = auto()
     MAPPED_COLUMN_ABSENT = auto()
     MAPPING_NOT_APPLIED = auto()
     IGNORED_COLUMN_ABSENT = auto()

@@ -19,11 +19,7 @@ from drivetwin.estimation.data.actuators import (
     LogShifts,
     identify_actuators,
 )
-from drivetwin.estimation.data.prepare import (
-    USUAL_TOLERANCES,
-    list_usual_tolerances,
-    prepare,
-)
+from drivetwin.estimation.data.prepare import get_usual_gains, prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.direct.momentum_balance import align_output_torque
 from drivetwin.estimation.identification import Identification
@@ -196,9 +192,7 @@ def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> P
     """Prepare a log, with what is implausible on the card among its findings."""
     prepared = prepare(log, card, shifts)
     doubts = check_card(card, log, shifts.shifts)
-    usual = [
-        f"{name.replace('_', ' ')} {100.0 * USUAL_TOLERANCES[name].gain:g} %"
-        for name in list_usual_tolerances(log, card)
-    ]
-    assumed = [report(Code.USUAL_TOLERANCES, gains=", ".join(usual))] if usual else []
+    gains = get_usual_gains(log, card, turbine_driven=prepared.turbine_driven)
+    usual = [f"{one.replace('_', ' ')} {100.0 * gain:g} %" for one, gain in gains.items()]
+    assumed = [report(Code.NO_SENSOR_TOLERANCES, gains=", ".join(usual))] if usual else []
     return replace(prepared, findings=(*prepared.findings, *doubts, *assumed))

@@ -45,6 +45,8 @@ def recording(name: str) -> tuple[ShiftLog, VehicleCard, FoundShifts]:
     if not path.exists():
         pytest.skip(f"{path.name} is not beside the repository")
     card = load_card(ROOT / "examples" / "vehicles" / f"{name}.toml")
+    exact = dict.fromkeys(("engine_torque", "output_torque"), SensorTolerance())
+    card = replace(card, sensors=exact)
     log = read_log(path, card)
     return log, card, detect_shifts(log, card)
 
@@ -187,7 +189,7 @@ def test_inertias_outside_the_cards_ranges_are_told() -> None:
 
 def test_tolerances_enter_the_likelihood_as_shifts_of_its_minimum() -> None:
     log, card, shifts = recording("truck_a")
-    stated = replace(card, sensors={"output_torque": SensorTolerance(gain=0.01)})
+    stated = replace(card, sensors={**card.sensors, "output_torque": SensorTolerance(gain=0.01)})
     found = identify(log, stated, shifts, Method.LIKELIHOOD)
     for name in ("eta", "k_o", "Tv_over_if", "J_vehicle"):
         estimate = found.estimates[name]

@@ -150,7 +150,7 @@ def test_actuators_friction_and_origin() -> None:
 
 def test_findings_are_listed_by_severity() -> None:
     findings = (
-        report(Code.USUAL_TOLERANCES, gains="output torque 0.5 %"),
+        report(Code.NO_SENSOR_TOLERANCES, gains="output torque 0.5 %"),
         report(Code.GEAR_POORLY_EXCITED, variation=1.0, gear="2"),
         report(Code.LIKELIHOOD_FAILED, why="no minimum"),
     )

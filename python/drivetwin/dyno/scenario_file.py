@@ -123,6 +123,8 @@ def format_card(scenario: Scenario) -> str:
     card.add("gears", gears)
     card.add("elements", tomlkit.item(elements))
     card.add("inertia", tomlkit.item(inertia))
+    exact = {one.role: {"gain_tolerance": 0.0} for one in scenario.sensors if one.role in TORQUES}
+    card.add("sensors", tomlkit.item(exact))
     if scenario.converter is not None:
         table = ConverterTable.from_converter(scenario.converter.converter)
         card.add("converter", tomlkit.item(table.model_dump()))
@@ -154,6 +156,8 @@ Table = Mapping[str, Any]
 _FOLDER = Path(__file__).parent / "scenarios"
 COMMAND_RATE = 100.0
 """Rate [Hz] of the commands in a log, that of the controller's task."""
+TORQUES = ("engine_torque", "output_torque")
+"""Roles of the torque sensors: a scenario's have no gain error."""
 _STEP_TIME = 0.06
 """Time [s] in which the engine torque goes to its next level."""
 _SPEED_COLUMNS = {

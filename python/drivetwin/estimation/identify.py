@@ -148,7 +148,8 @@ def _check_card(found: EstimateSet, log: PreparedLog, method: Method) -> tuple[F
 
     The paper's method doubts each value by itself; behind a converter J′ is without the engine.
     """
-    is_exact = log.turbine_driven and "engine_torque" not in log.design.sensors
+    sensor = log.design.sensors.get("engine_torque")
+    is_exact = log.turbine_driven and (sensor is None or sensor.gain == 0.0)
     exact = (report(Code.CONVERTER_MAP_EXACT),) if is_exact else ()
     elsewhere = method is Method.PAPER or log.turbine_driven
     return exact if elsewhere else (*exact, *check_design_ranges(found.estimates, log.design))

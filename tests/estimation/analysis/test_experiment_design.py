@@ -67,7 +67,7 @@ def test_no_experiment_narrows_an_interval_that_effects_decide() -> None:
     ranked = _rank(replace(found, estimates={**found.estimates, "c_o": wide}))
     (one,) = (s for s in ranked if s.parameter == "c_o")
     assert not one.prospects
-    assert "Record another manoeuvre" in one.text
+    assert "record a manoeuvre in which" in one.text
 
 
 def test_an_identification_takes_up_what_would_tell_it_more() -> None:

@@ -28,6 +28,7 @@ KINDS = {
     "pressure.B3": Quantity.PRESSURE,
 }
 TORQUE = SensorTolerance(0.01, 30.0)
+TORQUES = {"engine_torque": SensorTolerance(), "output_torque": TORQUE}
 SHIFT = Shift(
     "2", "3", "B2", "B3", ShiftKind.POWER_ON_UP,
     before=(10.0, 20.0), torque_phase=(20.0, 20.2), inertia_phase=(20.2, 20.6),
@@ -55,16 +56,24 @@ def _collect(
 def test_the_tolerance_of_the_speed_sensor_that_is_read_is_one_of_the_engine_speed() -> None:
     """Behind an input gear of 1.2 the offset of the input speed is one of the engine's speed."""
     of_input, of_engine = SensorTolerance(1e-3, 0.5), SensorTolerance(2e-3, 0.1)
-    stated = {"input_speed": of_input, "engine_speed": of_engine, "output_torque": TORQUE}
-    read = {"output_torque": TORQUE, "engine_speed": SensorTolerance(1e-3, 0.6)}
+    stated = {**TORQUES, "input_speed": of_input, "engine_speed": of_engine}
+    read = {**TORQUES, "engine_speed": SensorTolerance(1e-3, 0.6)}
     assert _collect(stated) == read
     assert _collect(stated, engine=True) == {**read, "engine_speed": of_engine}
 
 
 def test_rows_that_show_values_late_make_ages_uncertain() -> None:
-    stated = {"output_torque": replace(TORQUE, delay=4e-3)}
+    stated = {**TORQUES, "output_torque": replace(TORQUE, delay=4e-3)}
     assert _collect(stated) == stated
     found, spread = _collect(stated, late=0.01), 0.01 / float(np.sqrt(12.0))
     assert found["output_torque"] == replace(TORQUE, delay=float(np.hypot(4e-3, spread)))
     assert found["engine_speed"] == found["pressure.B2"] == SensorTolerance(delay=spread)
     assert "input_speed" not in found
+
+
+def test_a_torque_without_a_stated_tolerance_has_the_usual_gain_error() -> None:
+    assert _collect({}) == {
+        "engine_torque": SensorTolerance(gain=0.01),
+        "output_torque": SensorTolerance(gain=0.005),
+    }
+    assert _collect(TORQUES) == TORQUES

@@ -399,17 +399,17 @@ def collect_tolerances(
     return _collect_tolerances(log, refer_to_turbine(log, card, shift), card)
 
 
-USUAL_TOLERANCES = {
-    "engine_torque": SensorTolerance(gain=0.01),
-    "output_torque": SensorTolerance(gain=0.005),
-}
-"""Tolerances of torque sensors of which the card states none: calibrated torque models of engine
-controllers are within a few per cent, installed torque meters within 0.1 to 1 % of reading."""
+USUAL_GAINS = {"engine_torque": 0.01, "output_torque": 0.005}
+"""Gain tolerances of torque sensors of which the card states none: calibrated torque models of
+engine controllers are within a few per cent, installed torque meters within 0.1 to 1 %."""
+USUAL_MAP_GAIN = 0.03
+"""Gain tolerance of a torque that follows from the map of a converter."""
 
 
-def list_usual_tolerances(log: ShiftLog, card: VehicleCard) -> list[str]:
-    """List the roles of a log whose sensors have a usual tolerance, because the card has none."""
-    return [one for one in USUAL_TOLERANCES if one in log and one not in card.sensors]
+def get_usual_gains(log: ShiftLog, card: VehicleCard, *, turbine_driven: bool) -> dict[str, float]:
+    """Return the usual gain tolerances by role of the sensors of which the card states none."""
+    usual = USUAL_GAINS | ({"engine_torque": USUAL_MAP_GAIN} if turbine_driven else {})
+    return {one: gain for one, gain in usual.items() if one in log and one not in card.sensors}
 
 
 def _collect_tolerances(
@@ -417,7 +417,8 @@ def _collect_tolerances(
 ) -> dict[str, SensorTolerance]:
     """Return the tolerances of a log; `referred` is the log behind an open converter."""
     read = "engine_speed" if "engine_speed" in referred else "input_speed"
-    usual = {one: USUAL_TOLERANCES[one] for one in list_usual_tolerances(log, card)}
+    gains = get_usual_gains(log, card, turbine_driven=referred is not log)
+    usual = {one: SensorTolerance(gain) for one, gain in gains.items()}
     stated = {role: one for role, one in card.sensors.items() if role not in ENGINE_SPEEDS}
     found = usual | stated
     if read in card.sensors:
