@@ -92,7 +92,7 @@ def _stretch_time(_: DynoRun, channel: Channel, size: float) -> FloatArray:
     if channel.role != "output_torque":
         return channel.values
     acting = channel.time[0] + (1.0 - size) * (channel.time - channel.time[0])
-    return np.interp(acting, channel.time, channel.values)
+    return np.asarray(np.interp(acting, channel.time, channel.values), dtype=np.float64)
 
 
 def _filter_torque(_: DynoRun, channel: Channel, size: float) -> FloatArray:
