@@ -116,25 +116,24 @@ TORQUE_LAG = Effect(
 
 
 MAP_COUNT = 4
-"""Columns of the error of a torque map: waves of at least half the range of the torque."""
+"""Columns of the error of a torque map: waves of at least half the largest torque."""
 
 
 def build_torque_map(at: OperatingPoint, std: float) -> list[Disturbance]:
-    """Add a random walk over the range of the engine torque, less its mean, to the torque."""
-    low, high = at.engine_torque.min(), at.engine_torque.max()
-    share = (at.engine_torque - low) / max(high - low, 1e-9)
-    growth = std * at.largest_engine_torque
-    columns = build_random_walk(share, MAP_COUNT, growth)
+    """Add a random walk over the engine torque, less its mean, to the torque without its noise."""
+    steady = at.record.steady_torque
+    delay = at.term.plant.get_value(at.point, "te_delay")
+    torque = np.interp(at.middle + delay, steady.time, steady.values)
+    share = np.abs(torque) / at.largest_engine_torque
+    columns = build_random_walk(share, MAP_COUNT, std * at.largest_engine_torque)
     return [Disturbance(inputs={TORQUE: -column}) for column in columns]
 
 
 def apply_torque_map(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
-    """Add a random walk over the range of the logged engine torque to the acting one."""
-    logged = vehicle.engine_torque
+    """Add a random walk over the logged engine torque to the acting one."""
+    logged, full = vehicle.engine_torque, vehicle.nominal.largest_engine_torque
     walk = draw_walk(WalkStream.TORQUE_MAP, vehicle.seed, 1.0)
-    low, high = logged.values.min(), logged.values.max()
-    share = (logged.values - low) / max(high - low, 1e-9)
-    error = size * vehicle.nominal.largest_engine_torque * np.interp(share, walk.time, walk.values)
+    error = size * full * np.interp(np.abs(logged.values) / full, walk.time, walk.values)
     return replace(vehicle, engine_torque=replace(logged, values=logged.values + error))
 
 
