@@ -50,7 +50,7 @@ def test_stated_values_are_used_and_recorded(data: tuple[Any, Any, Any], tmp_pat
     assert value is not None
     assert bool(outside) is not (1.7e5 <= value <= 1.74e5)
     free = _identify_quickly(data)
-    loose, tight = (one.estimates["k_o"].std_total or 0.0 for one in (free, result))
+    loose, tight = (one.estimates["k_o"].std_noise or 0.0 for one in (free, result))
     assert tight < loose
     assert "stated" not in free.settings
     drivetwin.save_result(tmp_path / "result.json", result)

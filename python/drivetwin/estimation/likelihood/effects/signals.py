@@ -120,13 +120,19 @@ MAP_COUNT = 4
 
 
 def build_torque_map(at: OperatingPoint, std: float) -> list[Disturbance]:
-    """Add a random walk over the engine torque, less its mean, to the torque without its noise."""
+    """Add a random walk over the engine torque to the torque without its noise.
+
+    Its part in proportion to the torque is a gain error, a constant part is drag at the input: both
+    have entries of their own, and a torque that hardly varies shows no other part.
+    """
     steady = at.record.steady_torque
     delay = at.term.plant.get_value(at.point, "te_delay")
     torque = np.interp(at.middle + delay, steady.time, steady.values)
     share = np.abs(torque) / at.largest_engine_torque
-    columns = build_random_walk(share, MAP_COUNT, std * at.largest_engine_torque)
-    return [Disturbance(inputs={TORQUE: -column}) for column in columns]
+    columns = np.array(build_random_walk(share, MAP_COUNT, std * at.largest_engine_torque)).T
+    line = np.column_stack([np.ones(share.size), share])
+    columns -= line @ np.linalg.lstsq(line, columns)[0]
+    return [Disturbance(inputs={TORQUE: -column}) for column in columns.T]
 
 
 def apply_torque_map(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
