@@ -264,7 +264,7 @@ def _describe_classes(role: str) -> str:
     classes = read_sensor_classes()
     names = list_classes(role)
     listed = "; ".join(f"{name}: {classes[name].title}" for name in names)
-    text = f"The class gives the tolerances ({listed}); none: intervals contain no sensor errors."
+    text = f"The class gives the tolerances ({listed}); none: the usual gain errors of torques."
     if any(classes[name].offset_limit_share for name in names):
         unit = get_offset_unit(role).replace("Nm", "N·m")
         text += f" Write CLASS:RANGE with the largest value measured [{unit}] if it has a range."
