@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivetwin._util.signal_processing import integrate_trapezoids
+from drivetwin._util.arrays import integrate_trapezoids
 from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
