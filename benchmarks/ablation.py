@@ -62,9 +62,10 @@ GROUPS: Mapping[str, tuple[EffectId, ...]] = {
     ),
     "effects: torque sensor": (
         *(EffectId.OUTPUT_TORQUE_OFFSET, EffectId.OUTPUT_TORQUE_DRIFT),
-        EffectId.OUTPUT_TORQUE_DELAY,
+        *(EffectId.OUTPUT_TORQUE_DELAY, EffectId.OUTPUT_TORQUE_CURVE),
     ),
-    "effects: inputs": (EffectId.PRESSURE_DELAY, EffectId.TORQUE_LAG),
+    "effects: speed sensors": (EffectId.SPEED_RUN_OUT,),
+    "effects: inputs": (EffectId.PRESSURE_DELAY, EffectId.TORQUE_LAG, EffectId.TORQUE_MAP),
     "effects: shaft, tyre": (
         *(EffectId.INPUT_SHAFT_MODE, EffectId.TYRE_SLIP, EffectId.BACKLASH),
         EffectId.PROGRESSIVE_SHAFT,

@@ -41,7 +41,10 @@ def named(hint: object) -> Iterator[type]:
 
 def held(classes: dict[type, dict[str, Any]]) -> dict[type, set[type]]:
     """By dataclass the classes that its fields may hold."""
-    by_name = {each.__name__: each for each in classes}
+    by_name: dict[str, type] = {}
+    for names in classes.values():
+        by_name |= {key: one for key, one in names.items() if isinstance(one, type)}
+    by_name |= {each.__name__: each for each in classes}
     found = {}
     for each, names in classes.items():
         # Names that a module imports for the type checker alone are not there when it runs.

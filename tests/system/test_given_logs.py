@@ -73,13 +73,14 @@ def test_a_log_with_repeated_rows_and_tolerances_of_both_gains_is_valid() -> Non
 
 
 def test_a_known_mass_sets_the_scale_without_an_output_torque() -> None:
+    """The mass is known to 1 %, the engine torque to the usual 1 %."""
     case = CASES / "commands"
     _, result = _run_identify(case / "press_notq.csv", case / "mass.card.toml")
     truth = json.loads((case / "full.truth.json").read_text())["parameters"]
     low, high = result["parameters"]["eta"]["ci95_total"]
     assert (low + high, high - low) == (
         pytest.approx(1.70, abs=0.01),
-        pytest.approx(0.036, abs=2e-3),
+        pytest.approx(0.0486, abs=2e-3),
     )
     for key in ("eta", "J_prime_2", "J_prime_3", "k_o", "c_o", "Tv_over_if"):
         low, high = result["parameters"][key]["ci95_total"]
