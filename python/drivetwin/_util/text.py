@@ -37,17 +37,6 @@ def escape_line(text: str) -> str:
     return escape_text(text, keep="")
 
 
-def escape_values(value: object) -> object:
-    """Return a JSON value with all its texts and keys escaped."""
-    if isinstance(value, str):
-        return value if value.isprintable() else escape_text(value)
-    if isinstance(value, Mapping):
-        return {escape_text(str(key)): escape_values(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [escape_values(one) for one in value]
-    return value
-
-
 def escape_json(text: str) -> str:
     r"""Return a JSON document in which characters without a glyph are `\u` escapes.
 

@@ -13,13 +13,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from drivetwin._util.display_units import Display, get_display_unit
+from drivetwin._util.text import escape_text
 from drivetwin.channels.roles import get_command_element, get_pressure_element, get_quantity
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.parameters import OVER_ETA, get_parameter_spec
 
 if TYPE_CHECKING:
-    import numpy as np
     import plotly.graph_objects as go
 
 
@@ -195,7 +197,7 @@ def _wrap(value: Any) -> Any:
     if isinstance(value, Mapping):
         return Entry(value)
     if isinstance(value, list | tuple):
-        return [_wrap(one) for one in value]
+        return [_wrap(one) if isinstance(one, Mapping | list | tuple) else one for one in value]
     return value
 
 
@@ -272,9 +274,12 @@ class Figure:
 
 
 def encode_entries(value: Any) -> Any:
-    """Convert entries to what JSON knows: arrays packed, numbers that are not finite null."""
-    import numpy as np  # here, because commands import the blocks before they run
+    """Convert entries to what JSON knows: arrays packed, numbers that are not finite null.
 
+    Characters of a text that have no glyph become escapes.
+    """
+    if isinstance(value, str):
+        return value if value.isprintable() else escape_text(value)
     if isinstance(value, Mapping):
         return {key: encode_entries(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):

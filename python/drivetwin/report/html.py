@@ -28,7 +28,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages, notify_progress
-from drivetwin._util.text import escape_text, escape_values
+from drivetwin._util.text import escape_text
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification, Several
 from drivetwin.report.blocks import Block, FigureBlock, Page, Section, build_findings_section
@@ -334,8 +334,8 @@ def encode_figure(block: FigureBlock, store: Store) -> Markup:
         layout["margin"] = {**layout["margin"], "t": _BELOW_BUTTONS}
     return _encode_json(
         {
-            "data": encode_entries([*map(Entry, stored), *block.figure.data[count:]]),
-            "layout": encode_entries(layout),
+            "data": [*map(Entry, stored), *block.figure.data[count:]],
+            "layout": layout,
             "zooms": [{"label": one.label, "change": one.args[0]} for one in buttons],
             "curves": curves,
             "link": block.link,
@@ -344,12 +344,13 @@ def encode_figure(block: FigureBlock, store: Store) -> Markup:
 
 
 def _encode_json(value: object) -> Markup:
-    return Markup(json.dumps(escape_values(value), separators=(",", ":")).replace("<", "\\u003c"))
+    return Markup(json.dumps(encode_entries(value), separators=(",", ":")).replace("<", "\\u003c"))
 
 
 def _show(value: object) -> object:
     """Return a value of the template as displayed: texts of others with escapes."""
-    return escape_text(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+    is_hidden = isinstance(value, str) and not (isinstance(value, Markup) or value.isprintable())
+    return escape_text(value) if is_hidden else value
 
 
 def read_template(name: str) -> Markup:

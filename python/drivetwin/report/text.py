@@ -38,7 +38,8 @@ class EscapingConsole(Console):
     ) -> Iterable[Segment]:
         """Render, with the text of each segment escaped."""
         for text, style, control in super().render(renderable, options):
-            yield Segment(text if control else escape_text(text), style, control)
+            is_plain = control or text.isprintable()
+            yield Segment(text if is_plain else escape_text(text), style, control)
 
     def render_str(self, text: str, **options: Any) -> Any:
         """Convert a plain text; escaped here because a text drops some control characters."""

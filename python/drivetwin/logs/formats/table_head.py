@@ -237,9 +237,11 @@ def split_strictly(line: str, separator: str) -> list[str]:
 
 def split_line(line: str, separator: str) -> list[str]:
     """Fields of a line without blanks around them; quotes that do not close are text."""
+    fields = line.split(separator)
     with contextlib.suppress(csv.Error):
-        return [restore_cell(cell.strip()) for cell in split_strictly(line, separator)]
-    return [restore_cell(cell.strip()) for cell in line.split(separator)]
+        fields = split_strictly(line, separator)
+    cells = map(str.strip, fields)
+    return [*map(restore_cell, cells)] if "'" in line else [*cells]
 
 
 def is_value(cell: str) -> bool:
