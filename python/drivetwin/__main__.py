@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import sys
 
-from drivetwin._util.interrupts import interrupt_on_signals, was_interrupted
+from drivetwin._util.atomic import interrupt_on_signals, was_interrupted
 from drivetwin.errors import INTERRUPTED
 
 LINEAR_ALGEBRA = ("OPENBLAS", "OMP", "MKL", "VECLIB")

@@ -11,7 +11,7 @@ import numpy as np
 
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages
-from drivetwin.channels.commands import refuse_commands
+from drivetwin.channels.recognition import refuse_commands
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MappingError, Where
 from drivetwin.estimation.data.actuators import (

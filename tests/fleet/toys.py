@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from drivetwin import Method
-from drivetwin._util.interrupts import interrupt_on_signals
+from drivetwin._util.atomic import interrupt_on_signals
 from drivetwin.fleet import parts, scan, task
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.rules import Sources, read_rules

@@ -20,9 +20,9 @@ from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.simulation.batch import BatchRequest, Keep
 from drivetwin.simulation.driveline import ENGINE, OUTPUT, SHAFT, Driveline
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
+from drivetwin.simulation.element_schema import as_json
 from drivetwin.simulation.network import Output, to_native
 from drivetwin.simulation.network_response import NetworkScenario, to_core_scenarios
-from drivetwin.simulation.serialize import as_json
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.initial_state import estimate_start_state
 from drivetwin.validation.simulate_log import SIGNALS

@@ -21,9 +21,9 @@ from drivetwin.calibration.metrics import (
 from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import BatchRequest, Keep
+from drivetwin.simulation.element_schema import as_json
 from drivetwin.simulation.network import Output, to_native
 from drivetwin.simulation.network_response import NetworkScenario, to_core_scenarios
-from drivetwin.simulation.serialize import as_json
 from drivetwin.simulation.shift_control import simulate_network_controlled
 
 _CHUNK = 256

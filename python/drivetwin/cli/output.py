@@ -19,11 +19,11 @@ import typer
 
 from drivetwin._util.atomic import (
     FOLDER_PREFIX,
+    defer_interrupts,
     find_existing,
     make_owner_name,
     refuse_overwrite,
 )
-from drivetwin._util.interrupts import defer_interrupts
 from drivetwin._util.text import escape_json
 from drivetwin.errors import DrivetwinError, InputError
 from drivetwin.findings import Finding

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from drivetwin._util.interrupts import ignore_interrupts
+from drivetwin._util.atomic import ignore_interrupts
 from drivetwin._util.request import Request, argument, input_file, option
 from drivetwin.cli.output import print_line
 from drivetwin.errors import MissingExtraError

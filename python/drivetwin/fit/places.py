@@ -11,10 +11,9 @@ from drivetwin.channels.roles import Quantity
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.fit.number_kinds import BESIDE, USUAL, UsualDeviation
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
-from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit, is_number
 from drivetwin.simulation.element_schema import Field as ElementField
 from drivetwin.simulation.network import Output, Start
-from drivetwin.simulation.serialize import is_number
 
 Keys = tuple[int | str, ...]
 """Keys that lead to a number of a run: `elements`, `speeds`, `twists`, `levels` of

@@ -12,10 +12,10 @@ from pathlib import Path
 from drivetwin._util.atomic import compute_digest
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages, notify_progress
-from drivetwin.channels.commands import check_commands
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping, read_project_mapping
+from drivetwin.channels.recognition import check_commands
 from drivetwin.channels.roles import (
     AUXILIARY,
     FOR_SHIFTS,

@@ -31,10 +31,14 @@ from drivetwin.modeling.element_methods import ElementMethods
 from drivetwin.modeling.model_components import Component, Node, Place
 from drivetwin.modeling.run import ModelRun
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray, Signal
-from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
+from drivetwin.simulation.element_schema import (
+    as_array,
+    find_element_faults,
+    refuse_faults,
+    require_number,
+)
 from drivetwin.simulation.network import Output, Sine, Start, make_input, simulate
 from drivetwin.simulation.network_sensitivity import NetworkSensitivities, Unknowns, differentiate
-from drivetwin.simulation.serialize import as_array, require_number
 
 _STEP, _ROW, _TOP, _BOX = 150.0, 46.0, 46.0, (116.0, 32.0)
 """Distances of nodes and of rows, height of the head, and size of a box [px]."""

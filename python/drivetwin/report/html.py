@@ -349,8 +349,9 @@ def _encode_json(value: object) -> Markup:
 
 def _show(value: object) -> object:
     """Return a value of the template as displayed: texts of others with escapes."""
-    is_hidden = isinstance(value, str) and not (isinstance(value, Markup) or value.isprintable())
-    return escape_text(value) if is_hidden else value
+    if isinstance(value, Markup) or not isinstance(value, str) or value.isprintable():
+        return value
+    return escape_text(value)
 
 
 def read_template(name: str) -> Markup:

@@ -27,6 +27,7 @@ from drivetwin.shifts.breakaway_lockup import (
     locate_torque_dip,
     smooth_channel,
 )
+from drivetwin.shifts.lockup_clutch import find_flag_start
 from drivetwin.shifts.shift import (
     GearboxSpeeds,
     Shift,
@@ -34,7 +35,6 @@ from drivetwin.shifts.shift import (
     classify_shift,
     is_shared_pressure,
 )
-from drivetwin.shifts.tcu_flags import find_flag_start
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue
 from drivetwin.vehicle.vehicle_card import VehicleCard

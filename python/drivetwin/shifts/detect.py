@@ -22,6 +22,7 @@ from drivetwin.shifts.candidate import (
     find_resting_ratio,
 )
 from drivetwin.shifts.coverage import find_causes
+from drivetwin.shifts.lockup_clutch import check_flags
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import (
     GearboxSpeeds,
@@ -31,7 +32,6 @@ from drivetwin.shifts.shift import (
     compute_gear_ratios,
     resample_speeds,
 )
-from drivetwin.shifts.tcu_flags import check_flags
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 

@@ -21,8 +21,8 @@ from drivetwin.simulation.dual_clutch import (
     require_delays,
     run_time,
 )
+from drivetwin.simulation.element_schema import as_array
 from drivetwin.simulation.network import NativeOutput
-from drivetwin.simulation.serialize import as_array
 
 Seed = tuple[int, str, FloatArray]
 """Number of an unknown, path of a number, its derivatives by the unknown: one for all runs (1,) or

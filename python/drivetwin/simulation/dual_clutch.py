@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.serialize import (
+from drivetwin.simulation.element_schema import (
     as_array,
     require_number,
     require_samples,

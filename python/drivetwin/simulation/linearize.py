@@ -19,9 +19,14 @@ from drivetwin._native import linearise as native_linearise
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline import SHAFT, build_driveline
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray
-from drivetwin.simulation.element_schema import find_element_faults, refuse_faults
+from drivetwin.simulation.element_schema import (
+    as_json,
+    as_names,
+    find_element_faults,
+    refuse_faults,
+    require_number,
+)
 from drivetwin.simulation.network import Element, Request, combine_columns, resolve_output
-from drivetwin.simulation.serialize import as_json, as_names, require_number
 
 Output = tuple[str, str]
 """A quantity and the name of its node or element, such as ("shaft_torque", "output shaft")."""

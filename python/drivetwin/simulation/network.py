@@ -28,12 +28,15 @@ from drivetwin.simulation.dual_clutch import (
 )
 from drivetwin.simulation.element_schema import (
     GROUND,
+    as_json,
+    as_names,
     find_element_faults,
+    format_value,
     list_inputs,
     list_ports,
     refuse_faults,
+    require_number,
 )
-from drivetwin.simulation.serialize import as_json, as_names, format_value, require_number
 
 _OF_NODES = ("speed", "acceleration", "angle")
 _OF_ELEMENTS = (

@@ -25,6 +25,7 @@ from drivetwin.simulation.dual_clutch import (
     run_time,
     to_delayed_core_samples,
 )
+from drivetwin.simulation.element_schema import as_json
 from drivetwin.simulation.network import (
     Element,
     NativeOutput,
@@ -41,7 +42,6 @@ from drivetwin.simulation.network_sensitivity import (
     require_derivatives,
     require_numbers,
 )
-from drivetwin.simulation.serialize import as_json
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ from drivetwin.simulation.dual_clutch import (
     run_time,
     to_delayed_core_samples,
 )
+from drivetwin.simulation.element_schema import as_json, as_names, is_number, require_number
 from drivetwin.simulation.network import (
     Element,
     NetworkRun,
@@ -38,7 +39,6 @@ from drivetwin.simulation.network import (
     simulate,
     to_core_sines,
 )
-from drivetwin.simulation.serialize import as_json, as_names, is_number, require_number
 from drivetwin.simulation.variable import Variable, list_variables, seed, seed_description
 
 LANES = _LANES

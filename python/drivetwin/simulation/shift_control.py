@@ -28,10 +28,10 @@ from drivetwin.simulation.dual_clutch import (
     run_time,
     to_delayed_core_samples,
 )
+from drivetwin.simulation.element_schema import as_array, as_json
 from drivetwin.simulation.network import Element, Output, Start
 from drivetwin.simulation.network_response import NetworkScenario, resolve_native
 from drivetwin.simulation.network_sensitivity import require_numbers
-from drivetwin.simulation.serialize import as_array, as_json
 
 INPUTS = (
     *("engine_torque", "pressure.offgoing", "pressure.oncoming"),

@@ -22,7 +22,7 @@ from drivetwin.export.entries import (
     start_entries,
 )
 from drivetwin.simulation.dual_clutch import DualClutch, FrictionTable, State
-from drivetwin.simulation.serialize import as_json
+from drivetwin.simulation.element_schema import as_json
 
 _LOSS_LAWS = {"paper": "DT_PAPER", "dissipative": "DT_DISSIPATIVE"}
 

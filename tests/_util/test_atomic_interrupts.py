@@ -10,8 +10,8 @@ import pytest
 
 import drivetwin.cli
 from drivetwin.__main__ import main
-from drivetwin._util import interrupts
-from drivetwin._util.interrupts import (
+from drivetwin._util import atomic
+from drivetwin._util.atomic import (
     defer_interrupts,
     interrupt_on_signals,
 )
@@ -24,7 +24,7 @@ ENDING = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def _own_handlers(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Handlers of the tests as they were before."""
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
-    monkeypatch.setattr(interrupts, "_raised", [])
+    monkeypatch.setattr(atomic, "_raised", [])
     signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     for one, handler in before.items():

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.channels.commands import find_command_step
+from drivetwin.channels.recognition import find_command_step
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import MissingChannelError
