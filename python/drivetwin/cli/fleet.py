@@ -301,7 +301,7 @@ class EstimateFleet(StoreInput, command="fleet estimate"):
 
 
 def estimate(request: EstimateFleet) -> Outcome:
-    """Estimate over all logs: shared values, spread over units, ageing, changes, outliers."""
+    """Estimate over all logs: shared values, spread over units, ageing, outliers."""
     from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
     from drivetwin.fleet.report import build_estimate_blocks
     from drivetwin.fleet.store import Store
