@@ -66,11 +66,11 @@ def place_columns(acting: FloatArray, index: NDArray[np.intp], count: int) -> Fl
     """Return `count` columns (n, count), zero but for those `acting` (n, k) at the places `index`
     (k,).
 
-    Each is contiguous, so that the system assigns no memory to the zeros. Large ones are mapped:
-    the allocator writes zeros into memory that was in use before.
+    Each is contiguous, so that the system assigns no memory to the zeros. Large arrays that are
+    mostly zero are mapped: the allocator writes zeros into memory that was in use before.
     """
     shape = (len(acting), count)
-    if 8 * len(acting) * count < _MAPPED:
+    if 8 * len(acting) * count < _MAPPED or 2 * index.size > count:
         found = np.zeros(shape, order="F")
     else:
         found = np.ndarray(shape, buffer=mmap(-1, 8 * shape[0] * shape[1]), order="F")
