@@ -15,8 +15,7 @@ import pytest
 
 from drivetwin.export.c.write import write_c
 from drivetwin.export.compiler import detect_platform
-from drivetwin.export.entries import Subject, compute_steady_start
-from drivetwin.export.fixed_step import InputDelays, run_fixed_step
+from drivetwin.export.entries import InputDelays, Subject, compute_steady_start, run_fixed_step
 from drivetwin.export.fmu.build import Experiment
 from drivetwin.export.modelica.model import write_modelica
 from drivetwin.export.targets import InputKind

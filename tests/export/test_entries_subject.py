@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.export.entries import build_note, build_subject, compute_steady_start
-from drivetwin.export.fixed_step import InputDelays
+from drivetwin.export.entries import InputDelays, build_note, build_subject, compute_steady_start
 from drivetwin.export.targets import InputKind
 from tests.export.cases import (
     paper_model,

@@ -17,11 +17,10 @@ from jsonschema import Draft202012Validator
 from drivetwin.channels.mapping_file import format_mapping
 from drivetwin.channels.roles import ChannelSpec
 from drivetwin.estimation.result.method import ModelStatus
-from drivetwin.files.bus_file import BusFile
+from drivetwin.files.bus_file import BusFile, TcuFile, format_tcu_twin
 from drivetwin.files.fit_file import build_fit_file
 from drivetwin.files.result_file import ResultFile
 from drivetwin.files.schemas import FileKind, build_json_schema
-from drivetwin.files.tcu_twin_file import TcuFile, format_tcu_twin
 from drivetwin.files.twin_file import save_twin
 from drivetwin.fit.model_file import format_model
 from drivetwin.fit.synthesize import ModelName, read_builtin

@@ -16,7 +16,7 @@ import pytest
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli import main
 from drivetwin.export.compiler import detect_platform
-from drivetwin.export.fixed_step import run_fixed_step
+from drivetwin.export.entries import run_fixed_step
 from drivetwin.export.fmu.build import Experiment, build_measured_subject
 from drivetwin.export.modelica.model import write_modelica
 from drivetwin.export.targets import InputKind

@@ -13,12 +13,11 @@ import typer
 from drivetwin.cli.calibrate import calibrate
 from drivetwin.cli.card import card
 from drivetwin.cli.command_group import PLAIN, CommandGroup, Entry
-from drivetwin.cli.drive import drive
 from drivetwin.cli.examine import examine
 from drivetwin.cli.export import export
 from drivetwin.cli.fit import fit
 from drivetwin.cli.fleet import fleet
-from drivetwin.cli.gearbox import gearbox, reduce
+from drivetwin.cli.gearbox import drive, gearbox, reduce
 from drivetwin.cli.identify import identify
 from drivetwin.cli.inspect import inspect
 from drivetwin.cli.observe import observe

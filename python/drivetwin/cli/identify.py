@@ -197,7 +197,7 @@ def identify_controller_logs(request: Identify, vehicle: Path) -> Outcome:
 
     Raises InputError for options of other logs, and the typed errors of reader and fit.
     """
-    from drivetwin.files.tcu_twin_file import build_tcu_file
+    from drivetwin.files.bus_file import build_tcu_file
     from drivetwin.report.bus import build_tcu_blocks
     from drivetwin.tcu.card import load_controller_card
     from drivetwin.tcu.outcome import identify_controller
@@ -230,7 +230,7 @@ def _read_numbers(wanted: Sequence[str]) -> list[int] | None:
 def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; return their paths."""
     from drivetwin.cli.output import write_atomically
-    from drivetwin.files.tcu_twin_file import save_tcu_twin
+    from drivetwin.files.bus_file import save_tcu_twin
     from drivetwin.files.twin_file import save_twin
     from drivetwin.report.bus import build_tcu_page
     from drivetwin.report.html import save_page

@@ -76,7 +76,7 @@ def simulate(request: Simulate) -> Outcome:
 def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
     """Simulate every shift of a log by a twin, and write tables and pages."""
     from drivetwin._util.atomic import write_text
-    from drivetwin.export.fixed_step import Stepping, rerun_fixed_step
+    from drivetwin.export.entries import Stepping, rerun_fixed_step
     from drivetwin.files.records import dump_findings
     from drivetwin.report.blocks import build_findings_section
     from drivetwin.report.sections.summary import build_fit_table
@@ -123,7 +123,7 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
 def _find_controller_twin(source: Path) -> Path | None:
     """Return the twin of a gearbox control's log by its folder, its file or the result beside it;
     None for another result."""
-    from drivetwin.files.tcu_twin_file import is_tcu_twin
+    from drivetwin.files.bus_file import is_tcu_twin
 
     files = (source / TWIN,) if source.is_dir() else (source, source.with_name(TWIN))
     if not source.is_dir() and source.name not in (TWIN, TCU_RESULT):
@@ -137,7 +137,7 @@ def _simulate_controller(twin: Path, request: Simulate) -> Outcome:
     Raises InputError for options of other twins, and the typed errors of the reader.
     """
     from drivetwin._util.atomic import write_text
-    from drivetwin.files.tcu_twin_file import load_tcu_twin, record_prediction
+    from drivetwin.files.bus_file import load_tcu_twin, record_prediction
     from drivetwin.report.blocks import Tone, make_notes
     from drivetwin.report.bus import build_prediction_table, build_predictions_page
     from drivetwin.report.html import save_page

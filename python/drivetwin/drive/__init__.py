@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from drivetwin.drive.dogs import run
 from drivetwin.drive.plan import (
     Leg,
     LockUp,
@@ -21,7 +22,6 @@ from drivetwin.drive.powertrain import (
     select_powertrain,
 )
 from drivetwin.drive.result import DriveRun
-from drivetwin.drive.run import run
 
 __all__ = [
     "DriveRun",

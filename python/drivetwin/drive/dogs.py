@@ -16,7 +16,16 @@ from itertools import zip_longest
 
 import numpy as np
 
-from drivetwin.drive.driver import LOCK_UP_RAMP, LONGEST_SHIFT, PEDAL_RAMP, STEP, Driver, State
+from drivetwin._util.progress import notify_progress
+from drivetwin.drive.driver import (
+    LOCK_UP_RAMP,
+    LONGEST_SHIFT,
+    PEDAL_RAMP,
+    STEP,
+    Driver,
+    State,
+    build_grid,
+)
 from drivetwin.drive.plan import (
     CLOSE,
     FILL,
@@ -25,6 +34,7 @@ from drivetwin.drive.plan import (
     OPEN,
     RAMP,
     Leg,
+    Plan,
     Schedule,
     ShiftTo,
     Watched,
@@ -32,7 +42,7 @@ from drivetwin.drive.plan import (
     list_forward_gears,
 )
 from drivetwin.drive.powertrain import Powertrain
-from drivetwin.drive.result import BRAKE, PEDAL, Action
+from drivetwin.drive.result import BRAKE, PEDAL, TRACE_STEP, Action, DriveRun, build_drive_run
 from drivetwin.errors import CardError, InputError, SimulationError
 from drivetwin.gearbox import Gearbox, build_network_elements
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
@@ -318,3 +328,22 @@ def _describe_change(old: str | None, new: str | None) -> str:
     if old is None or new is None:
         return f"release {old}" if new is None else f"engage {new}"
     return f"{old}→{new}"
+
+
+def run(gearbox: Gearbox, powertrain: Powertrain, plan: Plan) -> DriveRun:
+    """Drive the plan from standstill in the lowest gear and return the motion.
+
+    Raises SimulationError where a leg does not end, a shift does not reach synchronism, or the
+    simulation does not complete; ReductionError for a shift that is not one element off and one on;
+    InputError for a plan without legs or a gearbox that cannot be driven.
+    """
+    if not plan:
+        raise InputError("the plan has no legs", "give at least one leg, with pedal and end")
+    driver = (DogDriver if gearbox.dogs else Driver)(gearbox, powertrain)
+    state = driver.start_drive(plan[0])
+    for count, leg in enumerate(plan):
+        notify_progress(count / (len(plan) + 1))
+        state = driver.run_leg(leg, state)
+    motion = driver.simulate(state.schedule, build_grid(0, round(state.time / STEP)), audit=True)
+    energy = driver.simulate_energy(state.schedule, motion.time[::TRACE_STEP])
+    return build_drive_run(gearbox, powertrain, state.schedule, state.actions, motion, energy)

@@ -50,8 +50,8 @@ _MODELS = {
     FileKind.RATIO_CARD: ("vehicle.card", "RatioCardFile"),
     FileKind.BUS: ("files.bus_file", "BusFile"),
     FileKind.TCU_CARD: ("tcu.card", "ControllerCardFile"),
-    FileKind.TCU: ("files.tcu_twin_file", "TcuFile"),
-    FileKind.TCU_TWIN: ("files.tcu_twin_file", "TcuTwinFile"),
+    FileKind.TCU: ("files.bus_file", "TcuFile"),
+    FileKind.TCU_TWIN: ("files.bus_file", "TcuTwinFile"),
 }
 """Module below the package, and the model there, by which the program itself checks the file; each
 is imported when it is asked for."""

@@ -25,6 +25,7 @@ from drivetwin.channels.roles import (
 from drivetwin.errors import InputError, ResultFileError, Where, suggest_spelling
 from drivetwin.estimation.result.estimate import LoadLaw
 from drivetwin.estimation.result.method import Method
+from drivetwin.files.bus_file import is_tcu_twin
 from drivetwin.files.records import (
     ActuatorRecord,
     CovarianceRecord,
@@ -37,7 +38,6 @@ from drivetwin.files.records import (
     read_record,
     write_toml,
 )
-from drivetwin.files.tcu_twin_file import is_tcu_twin
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.shift_control import SpeedSensor

@@ -24,11 +24,13 @@ from drivetwin.errors import InputError, NoShiftError, Where
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.export.c.write import generate_twin_source, read_model_sources
 from drivetwin.export.compiler import compile_library, detect_platform
-from drivetwin.export.entries import Subject, build_note, list_entries
-from drivetwin.export.fixed_step import (
+from drivetwin.export.entries import (
     InputDelays,
     Stepping,
+    Subject,
+    build_note,
     get_start_state,
+    list_entries,
     run_fixed_step,
     sample_inputs,
 )

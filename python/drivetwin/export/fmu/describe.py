@@ -12,8 +12,14 @@ from enum import StrEnum
 
 from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.channels.units import BAR, RPM
-from drivetwin.export.entries import Entry, Subject, get_lock_index, list_entries, start_entries
-from drivetwin.export.fixed_step import InputDelays
+from drivetwin.export.entries import (
+    Entry,
+    InputDelays,
+    Subject,
+    get_lock_index,
+    list_entries,
+    start_entries,
+)
 from drivetwin.export.parameters.content import (
     format_document,
     make_distinct,

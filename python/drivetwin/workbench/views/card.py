@@ -1,22 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""Card: open the vehicle card, its data and what is implausible about them."""
+"""Card: open the vehicle card, edit its numbers, or answer the questions of a new one."""
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from dash import Input, Output, dcc, html, no_update
+from dash import ALL, Input, Output, State, ctx, dcc, html, no_update
 from dash.development.base_component import Component
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from drivetwin.authoring.card_text import EntryPath, format_path, list_numbers
+from drivetwin.authoring.question import FormEntry, Key
+from drivetwin.errors import RefusedError
 from drivetwin.findings import render
 from drivetwin.report.sections.inputs import build_card_tables, build_ratio_tables
+from drivetwin.vehicle.card_fields import get_card_field
+from drivetwin.workbench.card_form import CardForm
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
-from drivetwin.workbench.views import card_form
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.sources import (
@@ -24,6 +31,259 @@ from drivetwin.workbench.views.sources import (
     format_source,
     register_opening,
 )
+
+_KEY = TypeAdapter(list[str | int])
+_EXISTING = {"keep": "keep it", "replace": "replace it"}
+
+
+class QuestionId(BaseModel, strict=True):
+    """Id of a field: the key of its question as a JSON list."""
+
+    question: str
+
+
+def _build_form_start() -> list[Component]:
+    """Build the begin of the form; the fields follow from the log."""
+    return [
+        html.H3("New card"),
+        ui.make_row(ui.make_button("Begin a card from the log", "begin-card")),
+        html.Div(id="form-content"),
+    ]
+
+
+def _register_form(page: ui.Page) -> None:
+    """Register the begin of a form, its fields, and the writing of the card."""
+    _register_fields(page)
+    _register_writing(page)
+
+    @page.callback(Input("begin-card", "n_clicks"), busy="begin-card")
+    def begin(session: Session, _: object) -> None:
+        """Read the log and show the questions."""
+        session.begin_card()
+        ui.notify_topic(ui.Topic.FORM)
+        ui.notify(
+            "Values in grey come from the log or are defaults. Type a better value over them."
+        )
+
+
+def _register_writing(page: ui.Page) -> None:
+    @page.callback(
+        Input("write-card", "n_clicks"),
+        State("name-card", "value"),
+        State("replace-card", "data-value"),
+        State({"question": ALL}, "value"),
+        State({"question": ALL}, "id"),
+        busy="write-card",
+    )
+    def write(
+        session: Session,
+        clicks: int | None,
+        name: str | None,
+        existing: Literal["keep", "replace"],
+        values: Sequence[str | None],
+        ids: Sequence[QuestionId],
+    ) -> None:
+        """Write the card into the folder and open it."""
+        if not clicks:
+            return
+        typed = collect_texts(values, [one.question for one in ids])
+        texts = {key: text for key, text in typed.items() if text}
+        open_written(
+            session, session.write_card(name or "", texts, can_replace=existing == "replace")
+        )
+
+
+def _register_fields(page: ui.Page) -> None:
+    @page.callback(
+        Output("form-fields", "children"),
+        Output("form-state", "children"),
+        Output({"note": ALL}, "children"),
+        Output({"question": ALL}, "placeholder"),
+        Input({"question": ALL}, "value"),
+        State({"question": ALL}, "id"),
+    )
+    def fill_in(
+        session: Session, values: Sequence[str | None], ids: Sequence[QuestionId]
+    ) -> tuple[object, ...]:
+        """Ask what follows from the answers; fields stay as long as the questions do."""
+        form = session.form
+        changed = [one.get("question") for one in ctx.triggered_prop_ids.values() if one]
+        # Only changed fields: others may be older than the texts that the server has.
+        rows = [k for k, one in enumerate(ids) if one.question in changed]
+        texts = collect_texts([values[k] for k in rows], [ids[k].question for k in rows])
+        kept = [no_update] * len(ids)
+        if form is None or not texts:
+            return no_update, no_update, kept, kept
+        form.fill_in(texts)
+        state = _describe_state(form)
+        if [_name_key(one.question.key) for one in form.entries] != [one.question for one in ids]:
+            return _build_fields(form), state, kept, kept
+        defaults = [one.question.format_default() for one in form.entries]
+        return no_update, state, [_build_notes(one) for one in form.entries], defaults
+
+    @page.callback(Output("form-content", "children"), Input(ui.make_due_id("card"), "data"))
+    def show(session: Session, _: object) -> list[Component]:
+        """Draw the form."""
+        return [] if session.form is None else build_form(session.form)
+
+
+def open_written(session: Session, source: Source) -> None:
+    """Open a card that was written into the folder."""
+    session.open_card(source)
+    ui.notify_topic(ui.Topic.LOG)
+    ui.notify_opened_log(f"{source.name} is written and open", session.work.require_open_log())
+
+
+def collect_texts(values: Sequence[str | None], ids: Sequence[str]) -> dict[Any, str]:
+    """Return the texts by the key of the field. Raises RefusedError for an id that is no key."""
+    try:
+        return {
+            tuple(_KEY.validate_json(one, strict=True)): value or ""
+            for value, one in zip(values, ids, strict=True)
+        }
+    except ValidationError:
+        raise RefusedError(
+            "the request names no field of the card", "load the page again"
+        ) from None
+
+
+def build_form(form: CardForm) -> list[Component]:
+    """Build the fields in groups, and below them the name of the file."""
+    return [
+        html.Div(_build_fields(form), id="form-fields"),
+        html.P(_describe_state(form), id="form-state", className="hint"),
+        build_writing("card", "File name", form.file_name, "Write and open the card"),
+    ]
+
+
+def build_writing(id: str, label: str, name: str, action: str) -> Component:
+    """Build name, choice and button that write a file; their ids end in `id`."""
+    return ui.make_row(
+        html.Div(ui.make_field(f"name-{id}", label, type="text", value=name), className="wide"),
+        ui.make_choice(f"replace-{id}", "If the file exists", _EXISTING, "keep"),
+        ui.make_button(action, f"write-{id}", main=True),
+    )
+
+
+def _describe_state(form: CardForm) -> str:
+    open_ = sum(bool(one.fault) for one in form.entries)
+    if not open_:
+        return "The card is complete."
+    return f"{open_} of {len(form.entries)} answers are missing or refused."
+
+
+def _build_fields(form: CardForm) -> list[Component]:
+    groups: dict[str, list[Component]] = {}
+    for entry in form.entries:
+        title = get_card_field(*entry.question.key).group
+        groups.setdefault(title, []).append(_build_entry(entry))
+    return [
+        html.Fieldset([html.Legend(title), *fields], className="questions")
+        for title, fields in groups.items()
+    ]
+
+
+def _name_key(key: Key) -> str:
+    """Return the id of a question."""
+    return json.dumps(list(key))
+
+
+def _build_notes(entry: FormEntry) -> list[Component]:
+    """Build the meaning of a question with the origin of its default, and the fault."""
+    question, meaning = entry.question, replace_options(entry.question.meaning)
+    if question.default is not None and question.default.note:
+        meaning = f"{meaning} {question.format_default()}: {question.default.note}."
+    parts: list[Component] = [html.P(meaning, className="hint")]
+    if entry.fault:
+        parts.append(html.P(replace_options(entry.fault), className="fault"))
+    return parts
+
+
+def _build_entry(entry: FormEntry) -> Component:
+    """Build field, explanation, and the reason why the typed answer is refused."""
+    question = entry.question
+    name = _name_key(question.key)
+    unit = f" [{question.unit}]" if question.unit else ""
+    choices = f"choices {name}" if question.choices else ""
+    parts: list[Component] = [
+        ui.make_field(
+            {"question": name},
+            f"{question.prompt}{unit}",
+            type="text",
+            value=entry.text,
+            debounce=True,
+            placeholder=question.format_default(),
+            list=choices,
+        ),
+        html.Div(_build_notes(entry), id={"note": name}),
+    ]
+    if question.choices:
+        options = [html.Option(value=str(one)) for one in question.choices]
+        parts.append(html.Datalist(options, id=choices))
+    return html.Div(parts, className="question")
+
+
+class EntryId(BaseModel, strict=True):
+    """Id of a field: the place of its entry as a JSON list."""
+
+    entry: str
+
+
+def _register_edit(page: ui.Page) -> None:
+    """Register the form for the numbers of the open card, and its writing."""
+
+    @page.callback(Output("edit-content", "children"), Input(ui.make_due_id("card"), "data"))
+    def show(session: Session, _: object) -> list[Component]:
+        """Draw the numbers of the open card."""
+        work = session.work
+        if work.opened is None or work.opened.card is None or work.card is None:
+            return []
+        return _build_edit_form(work.card.path.name, list_numbers(session.read_card_text()))
+
+    @page.callback(
+        Input("write-edited", "n_clicks"),
+        State("name-edited", "value"),
+        State("replace-edited", "data-value"),
+        State({"entry": ALL}, "value"),
+        State({"entry": ALL}, "id"),
+        busy="write-edited",
+    )
+    def write(
+        session: Session,
+        clicks: int | None,
+        name: str | None,
+        existing: Literal["keep", "replace"],
+        values: Sequence[str | None],
+        ids: Sequence[EntryId],
+    ) -> None:
+        """Write the card with the typed numbers and open it."""
+        if not clicks:
+            return
+        typed = collect_texts(values, [one.entry for one in ids])
+        open_written(
+            session,
+            session.write_edited_card(name or "", typed, can_replace=existing == "replace"),
+        )
+
+
+def _build_edit_form(name: str, numbers: dict[EntryPath, str]) -> list[Component]:
+    fields = [
+        ui.make_field(
+            {"entry": json.dumps(path)}, format_path(path), type="text", value=text, debounce=True
+        )
+        for path, text in numbers.items()
+    ]
+    form = [
+        html.Summary("Edit the numbers of the open card"),
+        ui.make_hint(
+            "Keys and units are those of the file. A number is VALUE, VALUE+-STD with one standard "
+            "deviation, or LOW..HIGH. Comments and all other entries stay."
+        ),
+        html.Div(fields, className="entries"),
+        build_writing("edited", "Name of the edited card", name, "Write and open the edited card"),
+    ]
+    return [html.Details(form, id="edit-form")]
+
 
 _CARDS = (".toml",)
 _HEAD = 64 * 2**10
@@ -57,15 +317,15 @@ def layout() -> list[Component]:
         html.Div(id="card-files"),
         html.Div(id="card-content"),
         html.Div(id="edit-content"),
-        *card_form.layout(),
+        *_build_form_start(),
     ]
 
 
 def register(page: ui.Page) -> None:
     """Register opening, and the data of the open card."""
     register_opening(page, "card", "card-file", open_card)
-    card_form.register_edit(page)
-    card_form.register(page)
+    _register_edit(page)
+    _register_form(page)
 
     @page.callback(
         Output("card-content", "children"),

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from drivetwin.export.c.loaded import CModel
-from drivetwin.export.entries import Subject
-from drivetwin.export.fixed_step import InputDelays
+from drivetwin.export.entries import InputDelays, Subject
 from drivetwin.export.fmu.build import BuildOptions, Experiment, build_fmu
 from drivetwin.export.targets import FmiVersion, InputKind
 from tests.export.cases import (
