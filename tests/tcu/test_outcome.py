@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomlkit
 
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.cli import main
@@ -19,6 +20,7 @@ from drivetwin.tcu.log import read_controller_log
 from drivetwin.tcu.plant import build_term
 from drivetwin.tcu.problem import build_problem
 from drivetwin.tcu.synthesize import make_log
+from drivetwin.tcu.unknowns import Stated, list_common
 from drivetwin.twin.twin import build_nominal_shift
 from tests.calibration.cases import QUICK
 
@@ -186,6 +188,45 @@ def test_an_impossible_card_is_refused(
     wrong.write_text(text.replace(old, new), encoding="utf-8")
     assert main(["identify", str(made / "log.csv"), "--vehicle", str(wrong)]) == 2
     assert "changes" in (shown := capsys.readouterr().err) or "converter" in shown
+
+
+def fix(card: str, key: str, apart: float) -> str:
+    """Return the card with an exact value, so many standard deviations off."""
+    table = tomlkit.parse(card)
+    value, std = table[key]["value"], table[key]["std"]
+    table[key] = {"value": value + apart * std, "std": 0.0}
+    return tomlkit.dumps(table)
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize(
+    "wrong", ["tyre", pytest.param("J_engine_kgm2", marks=pytest.mark.short), "J_turbine_kgm2"]
+)
+def test_a_plant_that_is_not_that_of_the_log_is_not_valid_with_wrong_numbers(
+    wrong: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts = make_log(seed, SHIFTS)
+    card = texts.card if wrong == "tyre" else fix(texts.card, wrong, 2.0)
+    for name, text in (("log.csv", texts.log), ("card.toml", card)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    if wrong == "tyre":
+        stiff = Stated(1e7, 0.01, "N*m", scaled=True)
+        usual = {**list_common(load_controller_card(tmp_path / "card.toml"))}
+        usual["tyre_slip_stiffness"] = stiff
+        monkeypatch.setattr("drivetwin.tcu.plant.list_common", lambda _: usual)
+    vehicle = str(tmp_path / "card.toml")
+    main(["identify", str(tmp_path / "log.csv"), "--vehicle", vehicle, "-o", str(tmp_path / "out")])
+    found, truth = read_result(tmp_path / "out"), json.loads(texts.truth)
+    names = set(truth).intersection(found["parameters"])
+    stated = {one: found["parameters"][one] for one in names}
+    units = {one: 1e5 if one.endswith(".P0") else 1.0 for one in names}
+    far = {
+        name: (one["value"] - truth[name] * units[name]) / one["std_noise"]
+        for name, one in stated.items()
+        if one["verdict"] == "identified"
+    }
+    assert found["status"] != "valid" or max(map(abs, far.values())) < 3.0, far
 
 
 def test_a_wrong_ratio_gives_no_value(

@@ -24,6 +24,8 @@ _USUAL = {
     "gain": 0.2,
 }
 """Relative standard deviations of bare numbers: inertias are guesses, gains are design values."""
+_EXACT = 1e-3
+"""Relative deviation of a value that a card states as exact: no log resolves less."""
 _LEAST_POINTS = 3
 """Fewest points of a converter map."""
 
@@ -191,4 +193,5 @@ def make_card(file: ControllerCardFile) -> ControllerCard:
 
 def _read(entry: PriorTable, kind: str) -> PriorValue:
     """Return a value with its stated or usual standard deviation."""
-    return entry.to_prior(lambda value: PriorValue(value, _USUAL[kind] * value))
+    stated = entry.to_prior(lambda value: PriorValue(value, _USUAL[kind] * value))
+    return PriorValue(stated.value, max(stated.std, _EXACT * stated.value))

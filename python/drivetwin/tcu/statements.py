@@ -16,7 +16,7 @@ from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.verdict import assess_with_prior
 from drivetwin.parameters import ParameterSpec
 from drivetwin.tcu.identify import FittedShifts
-from drivetwin.tcu.log import ControllerShift
+from drivetwin.tcu.log import REFERENCE_OIL, ControllerShift
 from drivetwin.tcu.predict import find_slip
 from drivetwin.tcu.unknowns import J_VEHICLE, Numbers
 from drivetwin.vehicle.spec import PriorValue
@@ -56,6 +56,8 @@ class Statement:
     unit: str
     meaning: str
     compute: Quantity
+    law: Quantity | None = None
+    """Standard deviation by a law that the log does not show."""
 
     @property
     def spec(self) -> ParameterSpec:
@@ -70,7 +72,7 @@ def state(found: FittedShifts) -> dict[str, Estimate]:
     """Estimate the quantities of vehicle and elements with verdicts, by name."""
     slopes = Slopes.from_fit(found)
     estimates = {
-        one.name: assess_quantity(found, slopes, one.name, one.compute, one.spec)
+        one.name: assess_quantity(found, slopes, one.name, one.compute, one)
         for one in (*_list_vehicle(), *_list_elements(found))
     }
     reasons = {"J_drum": _DRUM, "shaft_stiffness": _STIFFNESS, "shaft_damping": _DAMPING}
@@ -162,6 +164,7 @@ def _list_elements(found: FittedShifts) -> Iterator[Statement]:
                 "s",
                 "from the change of the commanded gear to the first torque, mean of the shifts",
                 partial(compute_onset, found=found, element=name),
+                partial(_compute_rise, found=found, element=name),
             )
 
 
@@ -188,17 +191,38 @@ def compute_capacity(given: Values, *, element: str, pressure: float) -> float:
     return given[f"{element}.{Numbers.GAIN}"] * over * bent
 
 
+def _list_onsets(given: Values, found: FittedShifts, element: str) -> FloatArray:
+    """List the times (n, 2) [s] from the change of the commanded gear to the end of the fill and to
+    the pressure P0, in the shifts in which an element applies.
+
+    In the plant the pressure rises from that of the return spring to P0 before the first torque. A
+    spring whose force grows over the stroke reaches P0 with the end of the fill. Both laws have the
+    same rise of torque where the first torque of the latter lies midway.
+    """
+    times = []
+    for term, shift in zip(found.problem.terms, found.shifts, strict=True):
+        if shift.on == element:
+            path, warmth = term.paths["on excess"], shift.oil - REFERENCE_OIL
+            excess = path.compute(*(given[name] for name in path.of))
+            kiss = given[f"{element}.{Numbers.P0}"] * (1.0 - given["P0_temperature"] * warmth)
+            friction = 1.0 - given["friction_temperature"] * warmth
+            spring = bar * friction * kiss * (1.0 - given["spring_share"])
+            ends = (find_onset(term.record.time, excess + one) for one in (spring, 0.0))
+            times.append([one - shift.change for one in ends])
+    return np.array(times)
+
+
 def compute_onset(given: Values, *, found: FittedShifts, element: str) -> float:
     """Compute the mean time [s] from the change of the commanded gear to the first torque of an
     element, over the shifts in which it applies."""
-    times = []
-    for term, shift in zip(found.problem.terms, found.shifts, strict=True):
-        if shift.on != element:
-            continue
-        path = term.paths["on excess"]
-        excess = path.compute(*(given[name] for name in path.of))
-        times.append(find_onset(term.record.time, excess) - shift.change)
-    return float(np.mean(times))
+    return float(np.mean(_list_onsets(given, found, element)))
+
+
+def _compute_rise(given: Values, *, found: FittedShifts, element: str) -> float:
+    """Compute the standard deviation [s] of the first torque anywhere between the end of the fill
+    and the pressure P0."""
+    apart = np.diff(_list_onsets(given, found, element))
+    return float(np.mean(np.abs(apart))) / math.sqrt(12.0)
 
 
 def find_onset(time: FloatArray, excess: FloatArray) -> float:
@@ -247,13 +271,16 @@ def assess_quantity(
     slopes: Slopes,
     name: str,
     quantity: Quantity,
-    declared: ParameterSpec | None = None,
+    stated: Statement | None = None,
 ) -> Estimate:
     """Assess a quantity by its standard deviation and by that of its priors."""
     row = slopes.differentiate([quantity])[0]
     value = quantity(slopes.values)
     wide = np.linalg.inv(found.coordinates.prior.precision)
     std, before = (math.sqrt(max(float(row @ c @ row), 0.0)) for c in (slopes.covariance, wide))
+    if stated is not None and stated.law is not None:
+        std = math.hypot(std, stated.law(slopes.values))
+    declared = None if stated is None else stated.spec
     return assess_with_prior(
         (name, value, std), PriorValue(value, before), METHOD, declared=declared
     )
