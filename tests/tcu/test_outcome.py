@@ -199,19 +199,16 @@ def fix(card: str, key: str, apart: float) -> str:
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize("seed", [3, 4])
-@pytest.mark.parametrize(
-    "wrong", ["tyre", pytest.param("J_engine_kgm2", marks=pytest.mark.short), "J_turbine_kgm2"]
-)
+@pytest.mark.parametrize("wrong", ["tyre", pytest.param("J_engine_kgm2", marks=pytest.mark.short)])
 def test_a_plant_that_is_not_that_of_the_log_is_not_valid_with_wrong_numbers(
-    wrong: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    texts = make_log(seed, SHIFTS)
+    texts = make_log(3, 6)
     card = texts.card if wrong == "tyre" else fix(texts.card, wrong, 2.0)
     for name, text in (("log.csv", texts.log), ("card.toml", card)):
         (tmp_path / name).write_text(text, encoding="utf-8")
     if wrong == "tyre":
-        stiff = Stated(1e7, 0.01, "N*m", scaled=True)
+        stiff = Stated(2e5, 0.01, "N*m", scaled=True)
         usual = {**list_common(load_controller_card(tmp_path / "card.toml"))}
         usual["tyre_slip_stiffness"] = stiff
         monkeypatch.setattr("drivetwin.tcu.plant.list_common", lambda _: usual)
@@ -226,7 +223,7 @@ def test_a_plant_that_is_not_that_of_the_log_is_not_valid_with_wrong_numbers(
         for name, one in stated.items()
         if one["verdict"] == "identified"
     }
-    assert found["status"] != "valid" or max(map(abs, far.values())) < 3.0, far
+    assert found["status"] != "valid" or max(map(abs, far.values()), default=0.0) < 3.0, far
 
 
 def test_a_wrong_ratio_gives_no_value(

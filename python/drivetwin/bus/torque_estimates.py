@@ -213,7 +213,9 @@ def _combine_fixed(
 ) -> tuple[FloatArray, FloatArray] | None:
     """Weighted least squares without scatter: mean (p,) and covariance (p, p); None if singular.
 
-    Intervals of the gears hold the scatter already. A misfit between them widens the result.
+    Intervals of the gears hold the scatter already. A misfit between them widens the result. All
+    gears have the errors of one torque message, whose correlation is not known: the covariance is
+    that of their intersection with equal weights (Julier and Uhlmann 1997).
     """
     if not values:
         return None
@@ -227,7 +229,7 @@ def _combine_fixed(
     square = sum(float((one.value - mean) @ one.information @ (one.value - mean)) for one in values)
     freedom = len(values) - mean.size
     widening = max(1.0, square / freedom if freedom > 0 else 1.0)
-    return np.asarray(mean), np.asarray(covariance * widening)
+    return np.asarray(mean), np.asarray(covariance * widening * len(values))
 
 
 def _add_dead_time(estimates: dict[str, Estimate], balances: Mapping[str, TorqueBalance]) -> None:
