@@ -29,6 +29,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.calibrate.true_units import draw_true_units, record_shift
 from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
@@ -173,10 +174,15 @@ def _compare(
     objective = Objective(task.limits, task.settings.tail_share, weight)
     outcomes = [fresh.evaluate(task.policy.build_control(one)) for one in values]
     reached = [_assess(objective, one) for one in outcomes]
+
+    def run(tried: Sequence[FloatArray], places: NDArray[np.intp] | None) -> list[Outcome]:
+        whole = polished.evaluate_all([space.build_control(each) for each in tried])
+        return whole if places is None else [each.select(places) for each in whole]
+
     best = []
     for place in np.argsort(reached, kind="stable")[:_POLISHES]:
         one = polish(
-            lambda tried: polished.evaluate_all([space.build_control(each) for each in tried]),
+            run,
             space.to_coordinates(values[place]),
             objective,
             _ITERATIONS,

@@ -158,7 +158,7 @@ def _soften(objective: Objective, outcome: Outcome) -> float:
     size = np.minimum(np.abs(outcome.jerk), 1e3) / 50.0
     peak = 50.0 * (size**_POWER).sum(axis=1) ** (1.0 / _POWER)
     soft = float((peak**_POWER).mean() ** (1.0 / _POWER))
-    excess = sum(float(one.compute_excess(outcome).mean()) for one in objective.limits)
+    excess = sum(float(np.maximum(one.measure(outcome), 0.0).mean()) for one in objective.limits)
     return soft + objective.weight * excess
 
 

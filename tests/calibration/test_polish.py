@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from drivetwin.calibration.keep_limits import keep_limits
@@ -20,8 +21,9 @@ from tests.support.arrays import FloatArray
 DRAWS = np.linspace(-1.0, 1.0, 20)
 
 
-def _run(candidates: Sequence[FloatArray]) -> list[Outcome]:
-    return [_run_one(at) for at in candidates]
+def _run(candidates: Sequence[FloatArray], places: NDArray[np.intp] | None = None) -> list[Outcome]:
+    whole = [_run_one(at) for at in candidates]
+    return whole if places is None else [one.select(places) for one in whole]
 
 
 def _run_one(at: FloatArray) -> Outcome:

@@ -7,12 +7,10 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from drivetwin.calibration import front
 from drivetwin.calibration.metrics import list_outputs
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli import main
@@ -197,7 +195,6 @@ def test_with_limits_out_of_reach_the_best_calibration_is_written(
     assert "limit 0.05" in error
     assert "raise the limit of the shift time" in error
     assert {one.name for one in out.iterdir()} == FILES
-    assert not out.with_name("out.resume.json").exists()
     assert "exceeded, binds" in (out / "report.html").read_text(encoding="utf-8")
     assert main([*given, *SHORT, "--json"]) == 2
     found = json.loads(capsys.readouterr().out)
@@ -267,42 +264,6 @@ def test_refusals(
 ) -> None:
     assert main(["calibrate", str(twin), "-o", str(tmp_path / "out"), *options]) == 2
     assert said in capsys.readouterr().err
-
-
-def test_an_interrupted_calibration_continues_to_the_same_result(
-    twin: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    limits = tmp_path / "limits.toml"
-    limits.write_text("[limits]\nshift_time_s = 1.2\n")
-    whole, out = tmp_path / "whole", tmp_path / "out"
-    given = ["calibrate", str(twin), "--shift", "2-3", "--limits", str(limits), "--front"]
-    assert main([*given, *SHORT, "-o", str(whole)]) == 0
-    kept = out.with_name("out.resume.json")
-    calls = iter(range(100))
-    polish = vars(front)["polish_from"]
-
-    def stop_later(*arguments: Any) -> object:
-        if next(calls) == 3:
-            raise KeyboardInterrupt
-        return polish(*arguments)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(front, "polish_from", stop_later)
-        assert main([*given, *SHORT, "-o", str(out)]) == 130
-    assert not out.exists()
-    assert len(json.loads(kept.read_text(encoding="utf-8"))["stages"]) == 4
-    limits.write_text("[limits]\nshift_time_s = 1.1\n")
-    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 2
-    assert "another limits file" in capsys.readouterr().err
-    limits.write_text("[limits]\nshift_time_s = 1.2\n")
-    assert main([*given, *SHORT, "-o", str(out), "--resume", "--seed", "2"]) == 2
-    assert "another seed" in capsys.readouterr().err
-    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 0
-    assert not kept.exists()
-    for name in ("calibration.toml", "certificate.json", "calibration.dcm"):
-        assert (out / name).read_bytes() == (whole / name).read_bytes()
-    assert main([*given, *SHORT, "-o", str(out), "--resume"]) == 2
-    assert "no interrupted calibration" in capsys.readouterr().err
 
 
 def _exceeds_usual(folder: Path) -> bool:

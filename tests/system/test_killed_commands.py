@@ -162,10 +162,8 @@ def complete(command: list[str], output: Path, printed: str) -> None:
 
     A fleet that `printed` its events computes no finished log again.
     """
-    resumed = (output / "out.resume.json").exists()
-    again = [*command, *(["--resume"] if resumed else [])]
     ended = subprocess.run(
-        [sys.executable, "-m", "drivetwin", *again], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "drivetwin", *command], capture_output=True, text=True, check=False
     )
     assert ended.returncode == 0, ended.stderr
     check_outputs(output, killed=False)
@@ -248,7 +246,7 @@ def test_the_next_run_removes_what_a_kill_left(folder: Path, tmp_path: Path) -> 
     with subprocess.Popen([sys.executable, "-c", ""]) as ended:
         ended.wait()
     gone, here = f"{platform.node()}.{ended.pid}", f"{platform.node()}.{os.getpid()}"
-    left = [tmp_path / f".drivetwin-{gone}.abc", tmp_path / f"out.resume.json.{gone}.ab12.partial"]
+    left = [tmp_path / f".drivetwin-{gone}.abc", tmp_path / f"out.json.{gone}.ab12.partial"]
     kept = [tmp_path / f".drivetwin-{here}.abc", tmp_path / f"mine.{here}.ab12.partial"]
     for folder_left, file_left in (left, kept):
         (folder_left / "sub").mkdir(parents=True)

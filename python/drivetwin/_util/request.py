@@ -372,17 +372,6 @@ class Request:
             if declared.decides and declared.role is None and declared.output is None
         }
 
-    def list_files(self) -> dict[str, Path | None]:
-        """Return the files that are read by name; None for a file that is not given."""
-        found: dict[str, Path | None] = {}
-        for name, declared in get_arguments(type(self)).items():
-            label, paths = name.replace("_", " "), getattr(self, name)
-            if declared.role is not None and isinstance(paths, tuple):
-                found |= {f"{label} {number}": one for number, one in enumerate(paths, 1)}
-            elif declared.role is not None:
-                found[label] = paths
-        return found
-
 
 def get_arguments(request: type[Request]) -> dict[str, Argument]:
     """Return the declarations of the fields of a request by name, in their order."""

@@ -34,7 +34,6 @@ from drivetwin.calibration.scenarios import (
 )
 from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings
-from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 
 _COARSE = 2e-3
 """Sampling step [s] of the search."""
@@ -88,16 +87,14 @@ class Calibration:
     bound: float | None
 
 
-def calibrate(task: Task, stages: Stages = NO_STAGES) -> Calibration:
-    """Search, polish and certify a calibration; `stages` may have its coordinates already.
+def calibrate(task: Task) -> Calibration:
+    """Search, polish and certify a calibration.
 
     The best one found is returned even if it exceeds a limit; see `require_limits`.
     """
     settings, space = task.settings, Space(task.policy)
     quick = make_quick_plant(task)
-    name = name_stage("calibration", task.maneuver.point)
-    size = (quick, len(space.free))
-    best = run_stage(stages, name, size, lambda: find_best(task, quick))
+    best = find_best(task, quick)
     plant = replace(quick, metrics=tuple(Metric))
     with _STAGES.enter("certificate", "certifying on fresh draws"):
         fresh = draw_for(task, settings.certificate_draws, Purpose.CERTIFICATE)
@@ -129,10 +126,12 @@ def find_best(task: Task, plant: Plant) -> FloatArray:
     """Search, polish and keep the limits; return the best coordinates (q,)."""
     linear, quick = linearise(task, plant)
     objective = build_objective(linear, quick)
+    # No slope leads away from a second slip: it costs the jerk of the start until it is removed.
+    light = replace(objective, held=1.0 / task.settings.penalty)
     with _STAGES.enter("search", "searching"):
-        found = _search(linear, quick, objective)
+        found = _search(linear, quick, light)
     with _STAGES.enter("polish", "polishing"):
-        polished = _polish(linear, quick, objective, found)
+        polished = _polish(linear, quick, light, found)
     with _STAGES.enter("limits", "checking the limits"):
         return _keep_limits(task, plant, objective, polished)
 
@@ -190,11 +189,11 @@ def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
         return [Candidate(space.start, float("inf"))]
     coarse = set_coarse_step(plant)
     few = _make_run(task, coarse, draw_for(task, settings.search_draws, Purpose.SEARCH))
-    other = _make_run(task, coarse, draw_for(task, settings.polish_draws, Purpose.POLISH))
+    other = _make_run(task, coarse, draw_for(task, settings.tail_draws, Purpose.TAIL))
 
     def improve(at: FloatArray) -> Candidate:
         found = polish(few, at, objective, settings.search_iterations).coordinates
-        return Candidate(found, objective.evaluate(other([found])[0]))
+        return Candidate(found, objective.evaluate(other([found], None)[0]))
 
     return search_minima(improve, space.start, settings, task.seed)
 
@@ -255,8 +254,11 @@ def _make_run(task: Task, plant: Plant, draws: Scenarios) -> Run:
     """Return the function that simulates coordinates (q,) over draws."""
     space = Space(task.policy)
 
-    def run(candidates: Sequence[FloatArray]) -> list[Outcome]:
-        return plant.evaluate_all([space.build_control(one) for one in candidates], draws)
+    def run(
+        candidates: Sequence[FloatArray], places: NDArray[np.intp] | None = None
+    ) -> list[Outcome]:
+        chosen = draws if places is None else draws.select(places)
+        return plant.evaluate_all([space.build_control(one) for one in candidates], chosen)
 
     return run
 

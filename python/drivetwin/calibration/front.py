@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
 
 import numpy as np
 
@@ -26,11 +25,10 @@ from drivetwin.calibration.calibrate import (
     set_coarse_step,
 )
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.metrics import Metric, Outcome
+from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit, Statistic
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose, Scenarios
-from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 
 _LIMITS = (0.96, 0.92, 0.88, 0.84, 0.80, 0.76)
 """Limits of what an arm moves, over that of the calibration."""
@@ -80,8 +78,8 @@ class Front:
     runs: int
 
 
-def trace_front(found: Calibration, stages: Stages = NO_STAGES) -> Front:
-    """Trace the front from a calibration along both arms; `stages` may have its first points."""
+def trace_front(found: Calibration) -> Front:
+    """Trace the front from a calibration along both arms."""
     task, plant = found.task, make_quick_plant(found.task, *_FIGURES)
     coarse = set_coarse_step(plant)
     fresh = draw_for(task, task.settings.neighbour_fresh_draws, Purpose.CERTIFICATE)
@@ -98,19 +96,10 @@ def trace_front(found: Calibration, stages: Stages = NO_STAGES) -> Front:
         for limits in bounds:
             share = (len(points) - 1) / total
             with scale_progress(share, share + 1.0 / total, "tracing the front"):
-                at = run_stage(
-                    stages,
-                    f"{name_stage('front', task.maneuver.point)} {len(points)}",
-                    (plant, at.size),
-                    partial(_polish, task.set_limits(limits), coarse, at),
-                )
+                at = polish_from(task.set_limits(limits), coarse, at).coordinates
             points.append(_assess(task, plant, fresh, (arm, at)))
     kept = select_nondominated(points)
     return Front(tuple(sorted(kept, key=lambda one: one.time)), len(points), plant.count.runs)
-
-
-def _polish(task: Task, plant: Plant, start: FloatArray) -> FloatArray:
-    return np.asarray(polish_from(task, plant, start).coordinates)
 
 
 def select_nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
@@ -157,11 +146,5 @@ def _assess(
     )
     energy = float(outcome.values[Metric.FRICTION_ENERGY].mean())
     others = [one for one in task.limits if one.metric not in _MOVED]
-    exceeded = tuple(one for one in others if _measure(one, outcome) > one.bound)
+    exceeded = tuple(one for one in others if np.quantile(one.measure(outcome), 0.95) > 0.0)
     return FrontPoint(arm, space.to_values(at), jerk, energy, time, exceeded)
-
-
-def _measure(limit: Limit, outcome: Outcome) -> float:
-    values = outcome.values[limit.metric]
-    mean = limit.statistic is Statistic.MEAN
-    return float(values.mean() if mean else np.quantile(values, 0.95))

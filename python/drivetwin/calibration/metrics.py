@@ -159,6 +159,11 @@ class Outcome:
     unlocked: NDArray[np.bool_]
     relocked: NDArray[np.bool_]
 
+    def select(self, part: NDArray[np.intp]) -> Outcome:
+        """Return the outcome of some runs."""
+        values = {name: one[part] for name, one in self.values.items()}
+        return Outcome(values, self.jerk[part], self.unlocked[part], self.relocked[part])
+
 
 def list_outputs(maneuver: Maneuver) -> tuple[Output, ...]:
     """Return the outputs of a batch that `compute_metrics` takes, in its order."""

@@ -38,12 +38,11 @@ class Limit:
                 f"give a finite positive number in {spell_unit(METRICS[self.metric].unit)}",
             )
 
-    def compute_excess(self, outcome: Outcome) -> FloatArray:
-        """Excess over the bound, relative to it, not below 0: (1,) of a mean, else (runs,)."""
-        values = outcome.values[self.metric]
-        if self.statistic is Statistic.MEAN:
-            values = values.mean(keepdims=True)
-        return np.asarray(np.maximum(values / self.bound - 1.0, 0.0))
+    def measure(self, outcome: Outcome) -> FloatArray:
+        """Relative distance from the bound, below 0 within it: (1,) of a mean, else (runs,)."""
+        values = outcome.values[self.metric] / self.bound - 1.0
+        mean = self.statistic is Statistic.MEAN
+        return np.asarray(values.mean(keepdims=True) if mean else values)
 
 
 _SUFFIX = {
@@ -84,19 +83,20 @@ def compute_tail_mean(values: FloatArray, share: float) -> float:
 class Objective:
     """Tail mean of peak jerk beyond the quantile `share`, plus penalties.
 
-    These are `weight` times the relative excesses over the limits, and times the share of units
-    whose on-coming element slips again after its lock-up.
+    These are `weight` times the relative excesses over the limits, and times `held` of the share
+    of units whose on-coming element slips again after its lock-up.
     """
 
     limits: Sequence[Limit]
     share: float
     weight: float
+    held: float = 1.0
 
     def evaluate(self, outcome: Outcome) -> float:
         """Return the value [m/s^3] of an outcome; smaller is better."""
         comfort = compute_tail_mean(outcome.values[Metric.PEAK_JERK], self.share)
-        excess = sum(float(one.compute_excess(outcome).mean()) for one in self.limits)
-        return comfort + self.weight * (excess + float(outcome.relocked.mean()))
+        excess = sum(float(np.maximum(one.measure(outcome), 0.0).mean()) for one in self.limits)
+        return comfort + self.weight * (excess + self.held * float(outcome.relocked.mean()))
 
     def tighten(self, margins: Sequence[float]) -> Objective:
         """Return the objective with bounds lower by relative `margins`, one for each limit."""

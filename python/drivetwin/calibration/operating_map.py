@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -30,12 +29,10 @@ from drivetwin.calibration.calibrate import (
     polish_from,
     set_coarse_step,
 )
-from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Purpose
-from drivetwin.calibration.stages import NO_STAGES, Stages, name_stage, run_stage
 from drivetwin.errors import InputError
 
 MakeTask = Callable[[OperatingPoint], Task]
@@ -128,8 +125,8 @@ class OperatingMap:
         return _interpolate(self.grid, self.points, point)
 
 
-def calibrate_map(make_task: MakeTask, grid: Grid, stages: Stages = NO_STAGES) -> OperatingMap:
-    """Calibrate all points of a grid; `stages` may have some of them.
+def calibrate_map(make_task: MakeTask, grid: Grid) -> OperatingMap:
+    """Calibrate all points of a grid.
 
     A point may exceed a limit; its certificate says so. Raises InputError for an operating point
     that has no such policy.
@@ -138,7 +135,7 @@ def calibrate_map(make_task: MakeTask, grid: Grid, stages: Stages = NO_STAGES) -
     rest = grid.places[1:]
     timed = _STAGES.repeat("point", len(rest)).repeat("between", len(grid.centres))
     with timed.enter("main"):
-        main = calibrate(tasks[grid.start], stages)
+        main = calibrate(tasks[grid.start])
     space = Space(main.task.policy)
     coordinates = {grid.start: space.to_coordinates(main.after.values)}
     points, runs = {grid.start: MapPoint(main.task, main.after)}, main.runs
@@ -146,12 +143,8 @@ def calibrate_map(make_task: MakeTask, grid: Grid, stages: Stages = NO_STAGES) -
         task, plant = tasks[place], make_quick_plant(tasks[place])
         near = min(coordinates, key=lambda one: _measure_distance(one, place))
         with timed.enter("point", "calibrating the map", number):
-            coordinates[place] = run_stage(
-                stages,
-                name_stage("map", grid.get_point(place)),
-                (plant, coordinates[near].size),
-                partial(_polish, task, plant, coordinates[near]),
-            )
+            found = polish_from(task, set_coarse_step(plant), coordinates[near])
+            coordinates[place] = found.coordinates
             points[place] = _assess(task, Space(task.policy).to_values(coordinates[place]))
         runs += plant.count.runs
     between = []
@@ -159,10 +152,6 @@ def calibrate_map(make_task: MakeTask, grid: Grid, stages: Stages = NO_STAGES) -
         with timed.enter("between", "certifying between the points", number):
             between.append(_assess(make_task(one), _interpolate(grid, points, one)))
     return OperatingMap(grid, main, points, tuple(between), runs)
-
-
-def _polish(task: Task, plant: Plant, start: FloatArray) -> FloatArray:
-    return np.asarray(polish_from(task, set_coarse_step(plant), start).coordinates)
 
 
 def _measure_distance(one: Place, other: Place) -> int:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Local polish by sequential linear programming with a trust region.
 
-In each step peak jerk and limits are linear in the coordinates, by forward differences over common
-scenarios. The linear program minimises the tail mean of peak jerk in its epigraph form and the
-excess over limits. Source: J. Nocedal and S. J. Wright, Numerical Optimization, section 18.5
-(Sℓ1LP); R. T. Rockafellar and S. Uryasev, Journal of Risk 2 (2000), for the tail mean.
+In each step peak jerk and limits are linear in the coordinates, by forward differences over the
+scenarios near their tails. The linear program minimises the tail mean of peak jerk in its epigraph
+form and the excess over limits. Source: J. Nocedal and S. J. Wright, Numerical Optimization,
+section 18.5 (Sℓ1LP); R. T. Rockafellar and S. Uryasev, Journal of Risk 2 (2000), for the tail mean.
 """
 
 from __future__ import annotations
@@ -20,12 +20,15 @@ from scipy.sparse import csr_array, hstack
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import notify_progress
-from drivetwin.calibration.metrics import Outcome
-from drivetwin.calibration.objective import Limit, Objective, Statistic
+from drivetwin.calibration.metrics import Metric, Outcome
+from drivetwin.calibration.objective import Objective, Statistic
 from drivetwin.calibration.search import Candidate
 
-Run = Callable[[Sequence[FloatArray]], list[Outcome]]
-"""Outcomes of candidates, coordinates (q,), over the scenarios."""
+Run = Callable[[Sequence[FloatArray], NDArray[np.intp] | None], list[Outcome]]
+"""Outcomes of candidates, coordinates (q,), over the scenarios of some places; None takes all."""
+
+_REACH = 2
+"""Scenarios whose jerk is linearised, over the number in the tail; the others stay below it."""
 
 _DIFFERENCE = 2e-5
 """Step of the differences, in shares of the ranges.
@@ -35,8 +38,6 @@ where the slope has no meaning; a shorter one comes near the tolerance of the so
 """
 _PEAKS = 8
 """Local maxima of |jerk| per scenario that enter a linear program."""
-_BESIDE = 3
-"""Samples beside a maximum that enter too, since it moves."""
 _STEEPEST = 5e4
 """Slope of jerk [m/s^3 per range] beyond which a difference straddles an event."""
 _FIRST_RADIUS, _LEAST_RADIUS, _LARGEST_RADIUS = 0.03, 2e-4, 0.25
@@ -117,14 +118,14 @@ def polish(run: Run, start: FloatArray, objective: Objective, iterations: int) -
 
     Each is solved in trust regions of several radii, so that one linearisation serves them all.
     """
-    at, outcome = start, run([start])[0]
+    at, outcome = start, run([start], None)[0]
     best, radius, stalls = objective.evaluate(outcome), _FIRST_RADIUS, 0
     program = None
     for iteration in range(iterations):
         notify_progress(iteration / iterations)
         program = program or _build_program(run, at, outcome, objective)
         tried = [program.solve(share * radius) for share in _RADII]
-        outcomes = run(tried)
+        outcomes = run(tried, None)
         values = [objective.evaluate(one) for one in outcomes]
         chosen = int(np.argmin(values))
         gain = best - values[chosen]
@@ -146,49 +147,62 @@ def _change_radius(radius: float, chosen: int | None) -> float:
 
 
 def _build_program(run: Run, at: FloatArray, outcome: Outcome, objective: Objective) -> Program:
-    """Linearise jerk and limits at coordinates (q,)."""
+    """Linearise jerk and limits at coordinates (q,), over the scenarios near the tails."""
     signs = np.where(at < 0.5, 1.0, -1.0)
-    moved = run([at + _DIFFERENCE * step for step in np.diag(signs)])
+    near = _choose_near_tails(outcome, objective)
+    moved = run([at + _DIFFERENCE * step for step in np.diag(signs)], near)
     width = _DIFFERENCE * signs
-    jerk = _linearise_jerk(outcome, moved, width)
-    limits = [_linearise_limit(one, outcome, moved, width) for one in objective.limits]
+    jerk = _linearise_jerk(outcome.select(near), moved, width)
+    limits = []
+    for one in objective.limits:
+        base, slope = _compute_slope(one.measure, outcome.select(near), moved, width)
+        if one.statistic is Statistic.MEAN:  # that of all scenarios, with the slope of some
+            base = one.measure(outcome)
+        limits.append(Linear(base, slope, np.arange(base.size)))
     return assemble_program(at, objective, jerk, limits, outcome.jerk.shape[0])
 
 
+def _choose_near_tails(outcome: Outcome, objective: Objective) -> NDArray[np.intp]:
+    """Return the places (n,) of the scenarios that a step may bring into a tail."""
+    tail = max(1, round((1.0 - objective.share) * outcome.jerk.shape[0]))
+    sizes = {one.metric: tail for one in objective.limits if one.statistic is Statistic.SHARE_95}
+    sizes[Metric.PEAK_JERK] = _REACH * tail
+    return np.unique(
+        np.concatenate([np.argsort(outcome.values[one])[-size:] for one, size in sizes.items()])
+    )
+
+
 def _linearise_jerk(outcome: Outcome, moved: list[Outcome], width: FloatArray) -> Linear:
+    """Linearise the largest local maxima of |jerk|.
+
+    Samples beside them are left out: where an event moves past a sample, its slope only hinders.
+    """
     size = np.abs(outcome.jerk)
-    rows, columns = [], []
-    for owner, values in enumerate(size):
-        inner = values[1:-1]
-        peaks = 1 + np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]))
-        peaks = peaks[np.argsort(-values[peaks])[:_PEAKS]]
-        near = np.concatenate([peaks, peaks - _BESIDE, peaks + _BESIDE])
-        near = np.unique(np.clip(near, 0, values.size - 1))
-        rows.append(np.full(near.size, owner))
-        columns.append(near)
-    r, c = np.concatenate(rows), np.concatenate(columns)
-    base = outcome.jerk[r, c]
-    sign = np.sign(base)
-    slope = np.stack([sign * (one.jerk[r, c] - base) / h
-                      for one, h in zip(moved, width, strict=True)], axis=1)  # fmt: skip
-    kept = np.abs(slope).max(axis=1) < _STEEPEST
-    return Linear(np.abs(base)[kept], slope[kept], r[kept])
-
-
-def _linearise_limit(
-    limit: Limit, outcome: Outcome, moved: list[Outcome], width: FloatArray
-) -> Linear:
-    """Relative distance from a limit, of each scenario or of their mean."""
+    inner = size[:, 1:-1]
+    owner, place = np.nonzero((inner >= size[:, :-2]) & (inner >= size[:, 2:]))
+    order = np.lexsort((-inner[owner, place], owner))
+    owner, place = owner[order], 1 + place[order]
+    rank = np.arange(owner.size) - np.searchsorted(owner, owner)
+    owner, place = owner[rank < _PEAKS], place[rank < _PEAKS]
 
     def measure(one: Outcome) -> FloatArray:
-        values = one.values[limit.metric] / limit.bound - 1.0
-        mean = limit.statistic is Statistic.MEAN
-        return np.asarray(values.mean(keepdims=True) if mean else values)
+        return np.asarray(np.abs(one.jerk[owner, place]))
 
+    base, slope = _compute_slope(measure, outcome, moved, width)
+    kept = np.abs(slope).max(axis=1) < _STEEPEST
+    return Linear(base[kept], slope[kept], owner[kept])
+
+
+def _compute_slope(
+    measure: Callable[[Outcome], FloatArray],
+    outcome: Outcome,
+    moved: list[Outcome],
+    width: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Measure an outcome (r,), and its slopes (r, q) by moves of `width` (q,)."""
     base = measure(outcome)
-    slope = np.stack([(measure(one) - base) / h for one, h in zip(moved, width, strict=True)],
-                     axis=1)  # fmt: skip
-    return Linear(base, slope, np.arange(base.size))
+    steps = [(measure(one) - base) / h for one, h in zip(moved, width, strict=True)]
+    return base, np.stack(steps, axis=1)
 
 
 def assemble_program(
@@ -196,19 +210,23 @@ def assemble_program(
 ) -> Program:
     """Assemble the program over step (q,), threshold, excess over it (runs,), and the limits'.
 
+    The rows are those of the scenarios near the tails; `scenarios` is the number of all.
     The tail mean is the threshold plus the mean excess over it divided by 1 - share.
     """
     counts = [one.value.size for one in limits]
+    near = 1 + max(jerk.owner.tolist(), default=-1)
     tail = 1.0 / ((1.0 - objective.share) * scenarios)
-    excess = [np.full(count, objective.weight / count) for count in counts]
-    cost = np.concatenate([np.zeros(at.size), [1.0], np.full(scenarios, tail), *excess])
+    means = [one.statistic is Statistic.MEAN for one in objective.limits]
+    excess = [np.full(count, objective.weight / (1 if mean else scenarios))
+              for count, mean in zip(counts, means, strict=True)]  # fmt: skip
+    cost = np.concatenate([np.zeros(at.size), [1.0], np.full(near, tail), *excess])
     value = np.concatenate([jerk.value, *(one.value for one in limits)])
     slope = np.concatenate([jerk.slope, *(one.slope for one in limits)])
     threshold = np.where(np.arange(value.size) < jerk.value.size, -1.0, 0.0)
-    own = np.concatenate([jerk.owner, scenarios + np.arange(sum(counts))])
+    own = np.concatenate([jerk.owner, near + np.arange(sum(counts))])
     slack = csr_array(
         (np.full(value.size, -1.0), (np.arange(value.size), own)),
-        shape=(value.size, scenarios + sum(counts)),
+        shape=(value.size, near + sum(counts)),
     )
     matrix = hstack([csr_array(slope), csr_array(threshold[:, None]), slack], format="csr")
     return Program(at, cost, matrix, -value, jerk.owner)

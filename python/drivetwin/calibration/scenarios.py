@@ -68,7 +68,7 @@ class Scenarios:
     count: int
     units: Sequence[ControlledUnit] = ()
 
-    def select(self, part: slice | NDArray[np.bool_]) -> Scenarios:
+    def select(self, part: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Scenarios:
         """Return a part of the scenarios."""
         places = np.arange(self.count)[part]
         sets = {name: values[part] for name, values in self.sets.items()}

@@ -13,12 +13,12 @@ from drivetwin.calibration.policies.kind import PolicyKind
 class CalibrationSettings:
     """Effort and tolerances of search, polish and certificate."""
 
-    starts: int = 8
+    starts: int = 20
     """Short polishes from random starts; the problem has many local minima. 0 polishes the start
     alone."""
-    hops: int = 18
+    hops: int = 34
     """Short polishes from hops of the best minima."""
-    finalists: int = 1
+    finalists: int = 2
     """Minima that are polished again on the draws for the tail."""
     initial_step: float = 0.15
     """Standard deviation of the random starts, in shares of the ranges."""
@@ -26,7 +26,7 @@ class CalibrationSettings:
     """Standard deviation of a hop, in shares of the ranges."""
     search_draws: int = 32
     """Scenarios of a short polish."""
-    search_iterations: int = 6
+    search_iterations: int = 20
     """Largest number of linear programs of a short polish."""
     polish_draws: int = 64
     """Scenarios by which minima are compared, and those of repairs."""
@@ -52,7 +52,7 @@ class CalibrationSettings:
     tail_share: float = 0.9
     """Quantile beyond which peak jerk is averaged. The mean beyond 90 % is the value of 95 % of the
     units where the tail is even. A mean beyond 98 % lowers the worst units at the cost of that."""
-    tail_iterations: int = 8
+    tail_iterations: int = 12
     """Largest number of linear programs of the last polish."""
     neighbour_draws: int = 40
     """Scenarios by which a point of the front or of a map is polished."""

@@ -84,15 +84,12 @@ if TYPE_CHECKING:
     from drivetwin.calibration.operating_map import Grid, OperatingMap
     from drivetwin.calibration.policies.own import UserController
     from drivetwin.calibration.twin_task import Request
-    from drivetwin.files.limits_file import StagesFile
     from drivetwin.findings import Finding
     from drivetwin.twin.twin import Twin
 
     Results = tuple[Calibration, Front | None, OperatingMap | None]
 
 CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "report.html"
-_RESUME = ".resume.json"
-"""Ending of the file beside the output folder that has the stages of an interrupted calibration."""
 
 
 class CalibrationFiles(TwinInput):
@@ -129,7 +126,6 @@ class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
     template: Path | None = input_file(
         "Template of the parameter files: labels, units, axes and breakpoints (TOML)."
     )
-    resume: bool = flag("Continue an interrupted calibration from DIR.resume.json.", decides=False)
     from_logs: tuple[Path, ...] = input_file(
         "Log of the vehicle's shifts with an earlier calibration (may be repeated): it corrects "
         "the twin. With --start the calibration is polished from there, not searched.",
@@ -159,15 +155,13 @@ def calibrate(request: Calibrate) -> Outcome:
     with nullcontext() if given is None else compile_controller(given) as controller:
         task, correction = _build_request(request, model, controller)
         model = model if correction is None else correction.twin
-        stages = _open_stages(request)
-        results = _calibrate(model, task, (request.grid, request.front), stages)
+        results = _calibrate(model, task, (request.grid, request.front))
         found = results[0]
         findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
         findings = (*list_log_findings(correction), *findings)
         learned = [] if correction is None else build_correction_blocks(correction, found)
         with show_step(f"writing {request.output}"):
             files = _write_results(request, results, (findings, learned), (model, task))
-    stages.remove()
     return Outcome(
         [*learned, *build_calibration_blocks(found, findings, *results[1:])],
         {
@@ -231,64 +225,31 @@ def _build_request(
     return choose_start(correction.twin, task, [one.values for one in starts]), correction
 
 
-def _open_stages(request: Calibrate) -> StagesFile:
-    """Open the store of finished stages beside the output folder."""
-    from drivetwin._util.atomic import compute_digest
-    from drivetwin._util.optional_dependencies import get_program_version
-    from drivetwin.files.limits_file import StagesFile, resume_stages
-
-    contents = {
-        f"{name} file": "" if path is None else compute_digest(path)
-        for name, path in request.list_files().items()
-    }
-    if request.controller is not None:
-        from drivetwin.files.limits_file import load_controller_file
-
-        sources = load_controller_file(request.controller).list_sources(request.controller)
-        contents |= {f"source {one.name}": compute_digest(one) for one in sources}
-    version = {"program version": get_program_version()}
-    inputs = {**contents, **request.describe_settings(), **version}
-    whole = request.output.resolve()
-    path = whole.parent / f"{whole.name}{_RESUME}"
-    return resume_stages(path, inputs) if request.resume else StagesFile(path, inputs)
-
-
-def _calibrate(
-    twin: Twin, request: Request, wanted: tuple[str | None, bool], stages: StagesFile
-) -> Results:
-    """Calibrate, with the map and the front if wanted; in a child process with a controller in C.
-
-    An error removes the finished stages: they would lead to it again. An interrupt leaves them.
-    """
+def _calibrate(twin: Twin, request: Request, wanted: tuple[str | None, bool]) -> Results:
+    """Calibrate, with map and front if wanted; in a child process with a controller in C."""
     from drivetwin.calibration.guarded_controller import run_guarded
 
-    arguments = (twin, request, wanted, stages)
-    try:
-        with show_step(f"calibrating {'-'.join(request.gears)} of {twin.name}"):
-            if request.controller is None:
-                return _compute(*arguments)
-            results: Results = run_guarded(request.controller.library, _compute, *arguments)
-            return results
-    except DrivetwinError:
-        stages.remove()
-        raise
+    with show_step(f"calibrating {'-'.join(request.gears)} of {twin.name}"):
+        if request.controller is None:
+            return _compute(twin, request, wanted)
+        library = request.controller.library
+        results: Results = run_guarded(library, _compute, twin, request, wanted)
+        return results
 
 
-def _compute(
-    twin: Twin, request: Request, wanted: tuple[str | None, bool], stages: StagesFile
-) -> Results:
+def _compute(twin: Twin, request: Request, wanted: tuple[str | None, bool]) -> Results:
     """Compute the calibration, with the map and the front if wanted."""
     from drivetwin.calibration.calibrate import calibrate as run_calibration
     from drivetwin.calibration.front import trace_front
     from drivetwin.calibration.twin_task import build_task
 
     grid, front = wanted
-    mapped = None if grid is None else _calibrate_grid(twin, request, grid, stages)
-    found = mapped.main if mapped else run_calibration(build_task(twin, request), stages)
-    return found, trace_front(found, stages) if front else None, mapped
+    mapped = None if grid is None else _calibrate_grid(twin, request, grid)
+    found = mapped.main if mapped else run_calibration(build_task(twin, request))
+    return found, trace_front(found) if front else None, mapped
 
 
-def _calibrate_grid(twin: Twin, request: Request, text: str, stages: StagesFile) -> OperatingMap:
+def _calibrate_grid(twin: Twin, request: Request, text: str) -> OperatingMap:
     from drivetwin.calibration.calibrate import Task
     from drivetwin.calibration.maneuver import OperatingPoint
     from drivetwin.calibration.operating_map import calibrate_map
@@ -305,7 +266,7 @@ def _calibrate_grid(twin: Twin, request: Request, text: str, stages: StagesFile)
         at = replace(request, engine_torque=point.engine_torque, engine_speed=point.engine_speed)
         return build_task(twin, replace(at, oil_temperature=oil))
 
-    return calibrate_map(make_task, parse_grid(text), stages)
+    return calibrate_map(make_task, parse_grid(text))
 
 
 def parse_grid(text: str) -> Grid:

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Files of a calibration: controllers, finished stages, limits, and scenarios of a test bench."""
+"""Files of a calibration: controllers, limits, and scenarios of a test bench."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -14,7 +13,6 @@ import numpy as np
 from pydantic import Field, FiniteFloat
 from scipy.constants import zero_Celsius
 
-from drivetwin._util.atomic import write_text
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
 from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.objective import Limit, build_limit_keys
@@ -22,11 +20,10 @@ from drivetwin.calibration.oil import FRICTION_SLOPE, FRICTION_SLOPE_STD, OilFri
 from drivetwin.calibration.policies.own import UserController
 from drivetwin.calibration.policy import PolicyParameter
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.stages import Stage, Stages
 from drivetwin.calibration.trial import Scenario, build_assertion_keys
 from drivetwin.channels.units import find_unit
-from drivetwin.errors import InputError, Where, suggest_spelling
-from drivetwin.files.records import Record, SchemaName, read_record
+from drivetwin.errors import InputError, suggest_spelling
+from drivetwin.files.records import Record
 from drivetwin.simulation.shift_control import SpeedSensor
 
 _CONTROLLER_REMEDY = "correct these entries; the how-to page on your own controller has an example"
@@ -138,83 +135,6 @@ def build_user_controller(content: ControllerFile, library: Path) -> UserControl
     return UserController(
         library, tuple(parameters), tuple(numbers), tuple(places), content.task_s, kelvin
     )
-
-
-STAGES_SCHEMA = "drivetwin/calibration-stages-1"
-
-
-class StageRecord(Record):
-    """Coordinates of a finished stage, and the number of simulated shifts."""
-
-    coordinates: list[FiniteFloat]
-    runs: int = Field(ge=0)
-
-
-class StagesRecord(Record):
-    """The whole file: what the stages depend on, by name, and the stages."""
-
-    schema_name: SchemaName
-    inputs: dict[str, str]
-    stages: dict[str, StageRecord]
-
-
-@dataclass(eq=False)
-class StagesFile(Stages):
-    """Store of finished stages in a file, which is written after each; `inputs` by name as texts.
-
-    The file appears with the first stage.
-    """
-
-    path: Path
-    inputs: Mapping[str, str]
-    finished: dict[str, Stage] = field(default_factory=dict)
-
-    def recall(self, name: str) -> Stage | None:
-        """Return a finished stage, or None."""
-        return self.finished.get(name)
-
-    def keep(self, name: str, stage: Stage) -> None:
-        """Keep a finished stage; the file appears whole or not at all."""
-        self.finished[name] = stage
-        stages = {
-            key: {"coordinates": one.coordinates.tolist(), "runs": one.runs}
-            for key, one in self.finished.items()
-        }
-        content = {"schema": STAGES_SCHEMA, "inputs": dict(self.inputs), "stages": stages}
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(self.path, json.dumps(content, indent=1, allow_nan=False) + "\n")
-
-    def remove(self) -> None:
-        """Remove the file of a calibration that is complete."""
-        self.path.unlink(missing_ok=True)
-
-
-def resume_stages(path: Path, inputs: Mapping[str, str]) -> StagesFile:
-    """Read the finished stages of the same calibration.
-
-    Raises InputError where there are none or where what they depend on has changed, and
-    ResultFileError for a damaged file.
-    """
-    if not path.is_file():
-        raise InputError(
-            "there is no interrupted calibration to resume",
-            "leave out --resume",
-            Where(file=str(path)),
-        )
-    content = read_record(path, json.loads, STAGES_SCHEMA, StagesRecord)
-    names = [*inputs, *(name for name in content.inputs if name not in inputs)]
-    changed = [name for name in names if content.inputs.get(name) != inputs.get(name)]
-    if changed:
-        raise InputError(
-            f"the interrupted calibration had another {', another '.join(changed)}",
-            "give the same files and options as then, or leave out --resume to start anew",
-            Where(file=str(path)),
-        )
-    finished = {
-        name: Stage(np.array(one.coordinates, dtype=np.float64), one.runs)
-        for name, one in content.stages.items()
-    }
-    return StagesFile(path, inputs, finished)
 
 
 class OilRecord(Record):
