@@ -52,3 +52,9 @@ def test_a_correction_that_leaves_the_minimum_goes_back_to_its_closest_step() ->
     found, truth = identify("etagear+plag5_361")
     check_inside(found, truth, ["P0.B2", "P0.B3", "eta", "J_vehicle"])
     assert Code.RESIDUAL_UNEXPLAINED not in [one.code for one in found.findings]
+
+
+def test_a_curved_torque_sensor_that_the_card_does_not_state_is_covered() -> None:
+    """Curved by 1.5 %: J_vehicle was 6 deviations off, without a trace in the residual."""
+    found, truth = identify("toquad_373")
+    check_inside(found, truth, ["eta", "J_prime_2", "J_prime_3", "J_vehicle", "k_o", "P0.B2"])

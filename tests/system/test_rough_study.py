@@ -22,13 +22,14 @@ from benchmarks.estimation.rough import (
 )
 from benchmarks.estimation.rough_card import draw_ratio_text, write_card
 from benchmarks.estimation.rough_count import (
+    FAR,
     RoughLog,
     compute_kept,
     compute_share,
     summarise,
 )
 from benchmarks.estimation.unlisted import UNLISTED, UnlistedId, add_unlisted
-from benchmarks.estimation.validity import StudyLog, make_log, make_sized_log
+from benchmarks.estimation.validity import StudyLog, make_log, make_sized_log, study_log
 from benchmarks.estimation.validity import summarise as summarise_validity
 from benchmarks.estimation.vehicles import draw_vehicle
 from drivetwin.estimation.result.estimate import FrictionCurve
@@ -103,6 +104,13 @@ def test_card_is_read_with_the_digits_of_its_text() -> None:
     exact = [scenario.get_ratio(one.element) for one in scenario.gears]
     assert ratios != exact
     assert ratios == pytest.approx(exact, abs=0.01)
+
+
+def test_a_short_oscillation_between_slow_samples_is_identified() -> None:
+    """16.6 Hz in speeds of 50 Hz: the first frequency is 9.5 Hz, from which no search came back."""
+    one = study_log(4001, None)
+    assert len(one.identified) >= 10
+    assert max(map(abs, one.identified.values())) < FAR
 
 
 @pytest.mark.parametrize("which", UnlistedId)
