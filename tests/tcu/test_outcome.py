@@ -199,6 +199,7 @@ def fix(card: str, key: str, apart: float) -> str:
 
 
 @pytest.mark.statistical
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("wrong", ["tyre", pytest.param("J_engine_kgm2", marks=pytest.mark.short)])
 def test_a_plant_that_is_not_that_of_the_log_is_not_valid_with_wrong_numbers(
     wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
