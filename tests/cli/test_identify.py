@@ -161,7 +161,7 @@ def test_strict_passes_a_confirmed_model_only(
     bench_files: Files, monkeypatch: pytest.MonkeyPatch, status: ModelStatus
 ) -> None:
     made = Outcome(document={}, is_confirmed=status.is_confirmed)
-    for name in ("identify_run.identify_log", "identify.identify_jointly"):
+    for name in ("identify.identify_log", "identify.identify_jointly"):
         monkeypatch.setattr(f"drivetwin.cli.{name}", lambda *_: made)
     arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
     expected = 0 if status in (ModelStatus.VALID, ModelStatus.LIMITED) else 3
