@@ -125,7 +125,7 @@ def list_failures(one: Entry, start: Entry, problem: Problem) -> list[str]:
 
 def solve(kind: PolicyKind, given: argparse.Namespace) -> list[str]:
     """Run all optimisers on a problem and print the table; return the bounds that are missed."""
-    problem, usual = _PROBLEMS[kind], CalibrationSettings.for_policy(kind)
+    problem, usual = _PROBLEMS[kind], CalibrationSettings()
     settings = replace(usual, threads=1, certificate_draws=FRESH)
     task = problem.make(settings, given.seed)
     fresh = draw_scenarios(task.maneuver, task.draw, FRESH, CERTIFICATE_SEED, Purpose.CERTIFICATE)

@@ -50,7 +50,7 @@ def try_vehicle(seed: int, effort: float) -> Trial:
     """Identify, calibrate and try one vehicle; print a line."""
     begin = time.process_time()
     made = make_vehicle(seed)
-    settings = replace(CalibrationSettings.for_policy(PolicyKind.SLIP), threads=1)
+    settings = replace(CalibrationSettings(), threads=1)
     request = made.build_request(PolicyKind.SLIP, settings.scale_effort(effort))
     found = calibrate(build_task(made.twin, request))
     promised = found.after.certificate.quantiles[Metric.PEAK_JERK].share_95

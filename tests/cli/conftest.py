@@ -36,5 +36,5 @@ def bench_files(tmp_path_factory: pytest.TempPathFactory) -> Files:
 def quick_search() -> Iterator[None]:
     """Few candidates and draws in all calibrations of a file."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(CalibrationSettings, "for_policy", lambda _: QUICK)
+        patch.setattr(CalibrationSettings, "scale_effort", lambda *_: QUICK)
         yield

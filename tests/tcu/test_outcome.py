@@ -75,7 +75,7 @@ def test_stated_values_contain_the_truth(made: Path) -> None:
 def test_the_twin_of_a_kind_of_shift_is_exported_and_calibrated(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(CalibrationSettings, "for_policy", lambda _: QUICK)
+    monkeypatch.setattr(CalibrationSettings, "scale_effort", lambda *_: QUICK)
     source, truth = made / "out" / "shift_2-3.toml", read_truth(made)
     twin = load_twin(source)
     model = twin.build_dual_clutch(build_nominal_shift(twin, ("2", "3")))

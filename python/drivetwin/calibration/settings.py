@@ -4,9 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
-
-from drivetwin.calibration.policies.kind import PolicyKind
 
 
 @dataclass(frozen=True)
@@ -16,7 +13,7 @@ class CalibrationSettings:
     starts: int = 20
     """Short polishes from random starts; the problem has many local minima. 0 polishes the start
     alone."""
-    hops: int = 34
+    hops: int = 30
     """Short polishes from hops of the best minima."""
     finalists: int = 2
     """Minima that are polished again on the draws for the tail."""
@@ -70,15 +67,6 @@ class CalibrationSettings:
     """Confidence of the certificate."""
     threads: int = 0
     """Threads of the simulation; 0 takes all cores."""
-
-    @classmethod
-    def for_policy(cls, policy: PolicyKind) -> Self:
-        """Return the default settings of a policy.
-
-        A run behind actuators, task by task, takes several times as long as one of profiles: few
-        minima are searched.
-        """
-        return cls(starts=5, hops=8) if policy.commands_actuators else cls()
 
     def scale_effort(self, factor: float) -> CalibrationSettings:
         """Return settings whose search and polish are longer by `factor`."""

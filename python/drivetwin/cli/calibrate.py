@@ -197,7 +197,7 @@ def _build_request(
 
     given = Requirements(()) if request.limits is None else load_limits(request.limits)
     gears, logs = parse_gears(request.shift), request.from_logs
-    usual = CalibrationSettings.for_policy(request.policy).scale_effort(request.effort)
+    usual = CalibrationSettings().scale_effort(request.effort)
     settings = replace(usual, certificate_draws=request.draws)
     task = Request(
         **request.select(CalibrationOptions),
