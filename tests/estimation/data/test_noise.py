@@ -7,10 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 from scipy.stats import norm
 
 from drivetwin._util.arrays import estimate_rounding_step
-from drivetwin.estimation.data.noise import estimate_quantization_error, estimate_white_noise
+from drivetwin.estimation.data.noise import (
+    estimate_noise,
+    estimate_quantization_error,
+    estimate_white_noise,
+)
 from drivetwin.estimation.data.shift_data import MeasuredSignal
 from tests.support.arrays import FloatArray
 
@@ -96,3 +101,21 @@ def test_a_signal_that_rests_nowhere_has_no_mean_error() -> None:
     ramp = STEP * np.round(2000.0 * time / STEP)
     assert estimate_quantization_error(MeasuredSignal(time, ramp, 4.0), STEP) == 0.0
     assert estimate_quantization_error(MeasuredSignal(time, ramp, 4.0), 0.0) == 0.0
+
+
+@pytest.mark.parametrize("corner", [60.0, 130.0, 250.0])
+def test_noise_behind_a_filter_counts_with_its_power_at_low_frequencies(corner: float) -> None:
+    """A low-pass of a telemetry, Hz: neighbouring samples hardly differ, slow errors stay."""
+    rng, time = np.random.default_rng(1), np.arange(0.0, 8.0, 1e-3)
+    white = rng.standard_normal(time.size)
+    signal = 300.0 + 200.0 * np.tanh(4.0 * (time - 4.0))
+    filtered = sosfilt(butter(2, corner, fs=1000.0, output="sos"), white)
+    assert estimate_noise(time, signal + white) == pytest.approx(1.0, rel=0.05)
+    assert estimate_white_noise(signal + filtered) < 0.5
+    assert 0.35 < estimate_noise(time, signal + filtered) < 1.2
+
+
+def test_a_signal_without_noise_has_none() -> None:
+    time = np.arange(0.0, 4.0, 1e-3)
+    swinging = 100.0 * np.sin(2.0 * np.pi * 12.0 * time)
+    assert estimate_noise(time, swinging) == estimate_white_noise(swinging)

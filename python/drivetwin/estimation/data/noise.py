@@ -71,15 +71,51 @@ def _compute_clipped_rms(squares: FloatArray) -> float:
     return float(np.sqrt(level))
 
 
+@dataclass(frozen=True)
+class FilteredNoiseSettings:
+    """Settings of the estimate of noise behind a low-pass filter."""
+
+    least_rate: float = 200.0
+    """Rate to which samples are thinned [Hz]: third differences pass 3 % of an oscillation of 20
+    Hz there."""
+    growth: tuple[float, float] = (1.25, 7.0)
+    """Growth of the noise of every second sample that shows a filter.
+    White noise does not grow, a signal without noise by a factor of 8 [ratio]."""
+
+
+FILTERED_NOISE = FilteredNoiseSettings()
+
+
+def estimate_noise(time: FloatArray, values: FloatArray) -> float:
+    """Estimate the standard deviation of white noise with the power of the noise of `values` (n,)
+    at low frequencies.
+
+    Behind a low-pass filter neighbouring samples have nearly the same noise, so that differences
+    show hardly any. Samples are thinned until their noise no longer grows; one of them counts as
+    much as the k that it stands for, whose white noise is √k times as large.
+    """
+    level, count = estimate_white_noise(values), 1
+    rate = (time.size - 1) / float(np.ptp(time)) if time.size > 1 else 0.0
+    low, high = FILTERED_NOISE.growth
+    while rate >= 2 * count * FILTERED_NOISE.least_rate:
+        thinned = estimate_white_noise(values[:: 2 * count])
+        if not low * level < thinned < high * level:
+            break
+        level, count = thinned, 2 * count
+    return level * float(np.sqrt(count))
+
+
 def prepare_signal(channel: Channel, factor: float = 1.0) -> MeasuredSignal:
     """Return the finite updates of a channel times `factor`, with their noise."""
     updates = channel.updates
     finite = np.isfinite(updates.values)
-    values = factor * updates.values[finite]
-    floor = estimate_rounding_step(values) / np.sqrt(12.0)
-    return MeasuredSignal(
-        updates.time[finite], values, max(estimate_white_noise(values), float(floor))
-    )
+    time, values = updates.time[finite], factor * updates.values[finite]
+    step = estimate_rounding_step(values)
+    # Rounding without noise grows in thinned samples as well, and has an estimate of its own.
+    noise = estimate_white_noise(values)
+    if noise > step:
+        noise = estimate_noise(time, values)
+    return MeasuredSignal(time, values, max(noise, float(step / np.sqrt(12.0))))
 
 
 @dataclass(frozen=True)
