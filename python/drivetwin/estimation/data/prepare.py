@@ -391,9 +391,10 @@ def _subtract(one: PriorValue, other: PriorValue) -> PriorValue:
 def collect_tolerances(
     log: ShiftLog, card: VehicleCard, shift: Shift
 ) -> dict[str, SensorTolerance]:
-    """Return the card's sensor tolerances by role, with ω_e from the speed sensor that is used.
+    """Return the sensor tolerances by role, with ω_e from the speed sensor that is used.
 
-    A speed sensor that is not used has none. If the log's table shows values up to a row late, the
+    They are those of the card; a torque sensor without one has the usual gain error. A speed sensor
+    that is not used has none. If the log's table shows values up to a row late, the
     delay of each channel is uncertain by that.
     """
     return _collect_tolerances(log, refer_to_turbine(log, card, shift), card)

@@ -7,16 +7,16 @@ from itertools import chain
 
 from drivetwin.estimation.likelihood.effects import (
     friction,
+    inputs,
     sensors,
     shaft,
-    signals,
     torques,
 )
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.result.cause import Group
 from drivetwin.vehicle.effects import EffectId
 
-_FILES = (torques, signals, sensors, shaft, friction)
+_FILES = (torques, inputs, sensors, shaft, friction)
 _BY_ID = {one.id: one for one in chain.from_iterable(each.EFFECTS for each in _FILES)}
 EFFECTS: dict[EffectId, Effect] = {name: _BY_ID[name] for name in EffectId}
 """Effects by name, in the order in which they are reported."""

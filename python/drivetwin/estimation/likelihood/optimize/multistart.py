@@ -79,7 +79,7 @@ def refine(
 
 
 def is_doubtful(problem: DualClutchProblem, point: ParameterVector) -> bool:
-    """Return whether a minimum by the sensors' noise is one of a wrong model."""
+    """Return whether Q at a point is as large as at a minimum of a wrong model."""
     cost = problem.update_weighting(point).cost(point)
     return cost > MULTI_START.doubtful_chi2 * problem.size
 
