@@ -17,16 +17,20 @@ import time
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.identify import IdentifiedActuator, PressureRecord, identify_actuator
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, IdentifiedActuator
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.actuators import ControlledActuator, Program
+from drivetwin.estimation.actuators import identify_actuator
+from drivetwin.estimation.data.actuators import PressureRecord
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.vehicle.spec import PriorValue
 
 _DURATION, _RATE, _NOISE, _RESOLUTION = 5.0, 1000.0, 7e3, 10.0
 _DEAD_TIME, _KISS = 0.005, 0.02
 """Stated bounds of the errors: of the dead time [s], of the kiss pressure relative."""
 _SHARE = 0.9
+USUAL = PriorValue(BAR)
+"""Design value of P0 [Pa]."""
 _RANGES = {
     "dead_time": (0.01, 0.08),
     "rising_lag": (0.010, 0.045),
@@ -76,7 +80,7 @@ def main() -> int:
     for number in range(count):
         random = np.random.default_rng([40, number])
         actuator = make_actuator(random)
-        found = identify_actuator([record(actuator, random)])
+        found = identify_actuator([record(actuator, random)], USUAL)
         error, covered = list_errors(found, actuator.model)
         errors.append(error)
         held.append(covered)

@@ -19,8 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import ActuatorModel, IdentifiedActuator
 from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import Metric

@@ -123,8 +123,6 @@ class Code(StrEnum):
     SIMULATION_DIVERGES = auto()
     OUTSIDE_IDENTIFIED_RANGE = auto()
     LOG_FOLLOWS_NO_CALIBRATION = auto()
-    ACTUATOR_ASSUMED = auto()
-    ACTUATOR_FROM_TORQUE = auto()
     ACTUATOR_NOT_IDENTIFIED = auto()
     ACTUATOR_UNDETERMINED = auto()
     NOT_VALIDATED = auto()

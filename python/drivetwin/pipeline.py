@@ -14,11 +14,8 @@ from drivetwin._util.progress import TimedStages
 from drivetwin.channels.recognition import refuse_commands
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MappingError, Where
-from drivetwin.estimation.data.actuators import (
-    FoundActuators,
-    LogShifts,
-    identify_actuators,
-)
+from drivetwin.estimation.actuators import FoundActuators, identify_actuators
+from drivetwin.estimation.data.actuators import collect_pressures
 from drivetwin.estimation.data.prepare import get_usual_gains, prepare
 from drivetwin.estimation.data.shift_data import PreparedLog
 from drivetwin.estimation.direct.momentum_balance import align_output_torque
@@ -121,7 +118,7 @@ def identify(
     stages = _BY_METHOD[method]
     with stages.enter("preparation", "preparing the log"):
         _refuse_wrong_pressures(log, card, shifts)
-        actuators = identify_actuators([LogShifts(log, shifts.shifts)], card)
+        actuators = _identify_actuators([log], card)
         prepared = _prepare_checked(log, apply_locks(card, locks), shifts)
         if method is not Method.PAPER:
             prepared = align_output_torque(prepared)
@@ -165,7 +162,7 @@ def identify_jointly(
         pairs = list(zip(logs, shifts, strict=True))
         for log, found in pairs:
             _refuse_wrong_pressures(log, card, found)
-        actuators = identify_actuators([LogShifts(log, one.shifts) for log, one in pairs], card)
+        actuators = _identify_actuators(logs, card)
         prepared = [align_output_torque(_prepare_checked(log, card, one)) for log, one in pairs]
     with _JOINT.enter("estimation"):
         return _attach_actuators(identify_joint(prepared), actuators)
@@ -178,6 +175,12 @@ def _refuse_wrong_pressures(log: ShiftLog, card: VehicleCard, found: FoundShifts
     for one in find_causes(log, card):
         if one.code is Code.PRESSURES_EXCHANGED:
             raise MappingError(one.cause, one.remedy, Where(file=log.source))
+
+
+def _identify_actuators(logs: Sequence[ShiftLog], card: VehicleCard) -> FoundActuators:
+    """Identify the actuators of the elements whose command and pressure the logs contain."""
+    records = collect_pressures(logs, card.elements)
+    return identify_actuators(records, {name: one.P0 for name, one in card.elements.items()})
 
 
 def _attach_actuators(found: Identification, actuators: FoundActuators) -> Identification:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import ActuatorModel, IdentifiedActuator
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.method import Method
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, RIM_SHARE

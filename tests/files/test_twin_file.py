@@ -13,8 +13,7 @@ import tomlkit
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.actuator.model import ActuatorModel
+from drivetwin.actuator.model import ActuatorModel, IdentifiedActuator
 from drivetwin.channels.roles import (
     BusOptions,
     ChannelSpec,

@@ -128,7 +128,6 @@ def test_actuators_friction_and_origin() -> None:
     (table,) = list_blocks(found, "actuators", "table")
     cells = {label.text: value for label, value in table.rows}
     assert cells["dead time T_d"].text == "20.0 ± 2.0 ms"
-    assert cells["kiss pressure P_k"].note == "assumed, not determined"
     (assumed,) = list_blocks(found, "provenance", "notes")
     borrowed = "friction of B2 is taken to be that of B3, ± 7 % beside the errors of both gains"
     assert borrowed in assumed.items

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from enum import StrEnum
 from typing import Annotated, Any
 
 import numpy as np
@@ -160,3 +161,49 @@ class ActuatorModel:
         time, values = (np.ascontiguousarray(one) for one in (command.time, command.values))
         given = json.dumps({name: float(getattr(self, name)) for name in QUANTITIES})
         return actuator_pressure(given, (time, values), initial, np.ascontiguousarray(at))
+
+
+class ActuatorSource(StrEnum):
+    """Quantity beside the command that an actuator is identified from."""
+
+    PRESSURE = "pressure"
+    """Measured pressure of the clutch."""
+    TORQUE = "torque"
+    """Torque of the clutch, in twins of earlier versions."""
+    SPEEDS = "speeds"
+    """Speeds in the log of a gearbox control."""
+    CARD = "card"
+    """Design values of the vehicle card."""
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedActuator:
+    """Model of an actuator with the covariance (7, 7) of its values, in the order of `QUANTITIES`.
+
+    A parameter without an estimate has an infinite variance; one from a vehicle card has none.
+    `rms` is the root mean square residual: of a pressure [Pa], of a torque balance over its noise.
+    `samples` counts the used ones.
+    """
+
+    model: ActuatorModel
+    covariance: FloatArray
+    rms: float = 0.0
+    samples: int = 0
+    source: ActuatorSource = ActuatorSource.PRESSURE
+
+    def delay(self, time: float) -> IdentifiedActuator:
+        """Return the actuator with a dead time longer by `time` [s], within its bounds."""
+        spec = QUANTITIES["dead_time"]
+        late = min(max(self.model.dead_time + time, spec.lower), spec.upper)
+        return replace(self, model=replace(self.model, dead_time=late))
+
+    @classmethod
+    def from_design(cls, model: ActuatorModel) -> IdentifiedActuator:
+        """Return a model from a vehicle card, which counts as exact."""
+        none = np.zeros((len(QUANTITIES), len(QUANTITIES)))
+        return cls(model, none, source=ActuatorSource.CARD)
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard deviations (7,)."""
+        return np.sqrt(np.diag(self.covariance))

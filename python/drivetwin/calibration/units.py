@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.identify import IdentifiedActuator
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, IdentifiedActuator
 from drivetwin.calibration.spread import Spread
 from drivetwin.simulation.shift_control import ControlledUnit, Sensors
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.model import IdentifiedActuator
 from drivetwin.channels.roles import RememberedMapping
 from drivetwin.errors import InputError
 from drivetwin.estimation.result.estimate import (

@@ -29,8 +29,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file, write_text
 from drivetwin._util.plain_values import convert_nonfinite, format_json
 from drivetwin._util.toml import raise_faults, validate_schema
-from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, ActuatorSource, IdentifiedActuator
 from drivetwin.errors import ResultFileError, Where
 from drivetwin.estimation.result.estimate import (
     OF_RATIO,

@@ -10,6 +10,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.units import RPM
+from drivetwin.estimation.data.noise import count_repeats
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.fit.driven_term import DrivenProblem
@@ -135,8 +136,6 @@ _LEAST_SIGMA = 0.6 * RPM
 FLOOR, _FLOOR_REPEATS = 3.0 * RPM, 10.0
 """Noise [rad/s] and repeats below which model errors of usual size are not excluded: residuals at
 the sensors' noise show no error of a law that other numbers have taken up."""
-_LAGS, _UNCORRELATED = 40, 0.05
-"""Rows over which a residual is correlated at most, and the correlation that counts as none."""
 
 
 def weigh(problem: DrivenProblem, noise: RowNoise, point: ParameterVector) -> DrivenProblem:
@@ -160,7 +159,7 @@ def estimate_noise(problem: DrivenProblem, point: ParameterVector) -> RowNoise:
     for name, parts in residuals.items():
         size = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
         sigma[name] = max(size, _LEAST_SIGMA)
-        repeats[name] = _count_repeats(parts)
+        repeats[name] = count_repeats(parts)
     return RowNoise(sigma, repeats)
 
 
@@ -196,15 +195,3 @@ def estimate_sizes(
         size = float(np.sqrt(odds @ _SIZES**2 / odds.sum()))
         found.update(dict.fromkeys(group, size))
     return found
-
-
-def _count_repeats(parts: Sequence[FloatArray]) -> float:
-    """Count the rows that carry the information of one independent row."""
-    products = [
-        np.mean([np.mean(one[lag:] * one[: one.size - lag]) for one in parts])
-        for lag in range(_LAGS)
-    ]
-    shares = np.array(products) / products[0]
-    below = np.flatnonzero(shares < _UNCORRELATED)
-    last = int(below[0]) if below.size else _LAGS
-    return float(max(1.0 + 2.0 * np.sum(shares[1:last]), 1.0))

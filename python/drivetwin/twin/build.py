@@ -14,8 +14,7 @@ from drivetwin._util.arrays import FloatArray, estimate_rounding_step, propagate
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.plain_values import to_plain_values
-from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel, ActuatorSource, IdentifiedActuator
 from drivetwin.channels.roles import RememberedChannel, RememberedMapping
 from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve, LoadLaw

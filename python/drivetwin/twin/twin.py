@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.rich_display import DisplayMixin
-from drivetwin.actuator.identify import IdentifiedActuator
+from drivetwin.actuator.model import IdentifiedActuator
 from drivetwin.channels.roles import RememberedMapping
 from drivetwin.errors import InputError, MissingParameterError, Where
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, LoadLaw, Verdict

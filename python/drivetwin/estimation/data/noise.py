@@ -16,6 +16,7 @@ error of the level.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,28 @@ class NoiseSettings:
 
 
 NOISE = NoiseSettings()
+
+
+_REPEAT_LAGS, _UNCORRELATED = 40, 0.05
+"""Samples over which a residual is correlated at most, and the correlation that counts as none."""
+
+
+def count_repeats(parts: Sequence[FloatArray]) -> float:
+    """Count the samples of residuals that carry the information of one independent sample.
+
+    It is the time over which they are correlated: the sum of their autocorrelations over all
+    `parts` (n_k,), at least 1.
+    """
+    lags = range(min(_REPEAT_LAGS, *(one.size for one in parts)))
+    products = [
+        np.mean([np.mean(one[lag:] * one[: one.size - lag]) for one in parts]) for lag in lags
+    ]
+    if products[0] == 0.0:
+        return 1.0
+    shares = np.array(products) / products[0]
+    below = np.flatnonzero(shares < _UNCORRELATED)
+    last = int(below[0]) if below.size else shares.size
+    return float(max(1.0 + 2.0 * np.sum(shares[1:last]), 1.0))
 
 
 _INNER_POWER = 0.97334

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from math import isinf
 
 from drivetwin._util.display_units import (
     BAR,
@@ -18,8 +17,12 @@ from drivetwin._util.display_units import (
     format_with_unit,
 )
 from drivetwin._util.optional_dependencies import get_program_version
-from drivetwin.actuator.identify import ActuatorSource, IdentifiedActuator
-from drivetwin.actuator.model import QUANTITIES, ActuatorQuantity
+from drivetwin.actuator.model import (
+    QUANTITIES,
+    ActuatorQuantity,
+    ActuatorSource,
+    IdentifiedActuator,
+)
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, SignalFit
@@ -356,10 +359,7 @@ def _build_table(name: str, one: IdentifiedActuator) -> TableBlock:
         _build_row(spec, value, std)
         for spec, value, std in zip(QUANTITIES.values(), values, stds, strict=True)
     ]
-    if one.source is ActuatorSource.TORQUE:
-        caption = f"Actuator of {name}, from command and clutch torque: {one.samples} values, "
-        caption += f"residual {one.rms:.2g} times the noise; usual ranges are priors"
-    elif one.source is ActuatorSource.SPEEDS:
+    if one.source is ActuatorSource.SPEEDS:
         caption = f"Actuator of {name}, from command and speeds"
     else:
         rms = format_with_unit(one.rms, "Pa", digits=3)
@@ -369,7 +369,4 @@ def _build_table(name: str, one: IdentifiedActuator) -> TableBlock:
 
 def _build_row(spec: ActuatorQuantity, value: float, std: float) -> tuple[object, ...]:
     label = Cell(f"{spec.label} {spec.symbol}", note=spec.meaning)
-    if isinf(std):
-        text = format_with_unit(value, spec.unit, digits=3)
-        return label, Cell(text, number=True, note="assumed, not determined", tone=Tone.UNKNOWN)
     return label, format_with_unit(value, spec.unit, Z95 * std)
