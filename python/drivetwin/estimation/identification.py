@@ -164,6 +164,8 @@ class StageResults:
     """The logs behind a fit of several, from `identify_joint`; None of one log."""
     numbers: Mapping[str, CardNumber] = field(default_factory=dict)
     """Number of the card that would narrow each parameter most; likelihood method only."""
+    map_changes: Mapping[int, float] = field(default_factory=dict)
+    """Relative change of the converter's torque at points of its map, by index of the point."""
     suggestions: tuple[ExperimentRanking, ...] = ()
     """Recommended experiments by parameter, from `rank_experiments`; likelihood method only."""
     validation: tuple[Validation, ...] = ()

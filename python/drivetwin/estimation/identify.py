@@ -114,6 +114,7 @@ def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identificatio
             cause=found.cause,
             spread=found.spread,
             numbers=found.numbers,
+            map_changes=found.map_changes,
         ),
         findings=findings,
         assumptions=(
@@ -302,6 +303,12 @@ def _collect_assumptions(design: DesignData, method: Method, found: EstimateSet)
         for name, prior in design.known.items()
         if method is not Method.PAPER
     ]
+    if found.map_changes:
+        changes = ", ".join(f"{100.0 * one:+.1f} %" for one in found.map_changes.values())
+        texts.append(
+            "the torque of the converter differs from the map on the card at the points passed, by "
+            f"increasing speed ratio: {changes}"
+        )
     if design.J_out is not None:
         J_out = format_with_unit(design.J_out.value, "kg*m^2", design.J_out.std)
         texts.append(f"design prior of J_out: {J_out} (1 sigma)")

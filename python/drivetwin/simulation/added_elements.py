@@ -42,6 +42,22 @@ class Converter:
         """Torque that the turbine gives [N m] at speeds of pump and turbine [rad/s], pump > 0."""
         return self.compute_torque_ratio(pump, turbine) * self.compute_pump_torque(pump, turbine)
 
+    def compute_point_torques(
+        self, pump: FloatArray, turbine: FloatArray
+    ) -> dict[int, FloatArray]:
+        """Derivatives of the turbine's torque (n,) [N m] by the relative change of its value at a
+        point of the map, by index; without the points at which the converter never works."""
+        at = np.divide(turbine, pump)
+        torque = self.compute_turbine_torque(pump, turbine)
+        near = np.eye(len(self.speed_ratio))
+        every = (np.interp(at, self.speed_ratio, one) * torque for one in near)
+        return {k: one for k, one in enumerate(every) if np.any(one != 0.0)}
+
+    def change_torque(self, changes: Mapping[int, float]) -> Converter:
+        """Return the map with relative changes of the torque at points, by index."""
+        capacity = [one * (1.0 + changes.get(k, 0.0)) for k, one in enumerate(self.capacity)]
+        return replace(self, capacity=tuple(capacity))
+
     def compute_turbine_slopes(
         self, pump: FloatArray, turbine: FloatArray, steps: tuple[float, float]
     ) -> tuple[FloatArray, FloatArray]:

@@ -83,7 +83,7 @@ def build_twin(found: Identification, card: VehicleCard) -> Twin:
         covariance=covariance,
         mapping=_remember_mapping(found, card),
         load_law=load,
-        converter=card.converter,
+        converter=card.converter and card.converter.change_torque(found.evidence.map_changes),
         actuators=_collect_actuators(found, card),
         wheel_radius=None if card.wheel_radius is None else card.wheel_radius.value,
         sensors=_describe_sensors(found),

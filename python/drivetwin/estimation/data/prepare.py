@@ -41,7 +41,7 @@ from drivetwin.shifts.lockup_clutch import (
     require_locked_converter,
 )
 from drivetwin.shifts.shift import RejectedShift, Shift, get_shift_pressures
-from drivetwin.vehicle.spec import PriorValue, SensorTolerance, multiply
+from drivetwin.vehicle.spec import CONVERTER_POINT_STD, PriorValue, SensorTolerance, multiply
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 MIN_SAMPLES = 10
@@ -338,7 +338,16 @@ def _build_speed_torque(
     pump, speed = (np.interp(time, one.time, one.values) for one in (engine, turbine))
     steps = max(engine.sigma, SECANT), max(turbine.sigma, SECANT)
     by_pump, by_turbine = card.converter.compute_turbine_slopes(pump, speed, steps)
-    return TorqueOfSpeeds(time, by_turbine, engine.sigma * np.abs(by_pump))
+    found = TorqueOfSpeeds(time, by_turbine, engine.sigma * np.abs(by_pump))
+    stated = card.sensors.get("engine_torque")
+    if stated is not None and stated.gain == 0.0:
+        return found
+    points = card.converter.compute_point_torques(pump, speed)
+    # Capacity and torque ratio are both off, but for a torque ratio of 1.
+    both = np.sqrt(2.0) * CONVERTER_POINT_STD
+    exact = [ratio == 1.0 for ratio in card.converter.torque_ratio]
+    std = {k: CONVERTER_POINT_STD if exact[k] else both for k in points}
+    return replace(found, points=points, point_std=std)
 
 
 def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:

@@ -64,12 +64,16 @@ class TorqueOfSpeeds:
     """Sensitivity of an engine torque that is a map of speeds to the noise of the compared one.
 
     `slope` (n,) [N m s/rad] is its derivative by ω_e at `time` (n,) [s], `rest` (n,) [N m] the
-    noise of its samples that is not from ω_e.
+    noise of its samples that is not from ω_e. `points` (n,) [N m] are its derivatives by the
+    relative error of the torque at each point of the map, by index, and `point_std` the standard
+    deviations of these errors; empty for an exact map.
     """
 
     time: FloatArray
     slope: FloatArray
     rest: FloatArray
+    points: Mapping[int, FloatArray] = field(default_factory=dict)
+    point_std: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ from drivetwin.estimation.likelihood.effects.correction import Correction, corre
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.motion import simulate_motion
 from drivetwin.estimation.likelihood.noise.residual_covariance import NoisePath
-from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
+from drivetwin.estimation.likelihood.parametrization import DualClutchTerm, read_map_changes
 from drivetwin.estimation.likelihood.selection.candidates import check_other_law, collect_loads
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_laws,
@@ -239,6 +239,7 @@ def build_estimates(
         cause,
         own.joint if scale is None else scale_covariance(own.joint, own.every, scale),
         rank_card_numbers(corrected, ids, matrix),
+        read_map_changes(corrected.mean),
     )
 
 

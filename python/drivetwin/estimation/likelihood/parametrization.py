@@ -156,6 +156,9 @@ SHAFT = ("k_o", "c_o")
 """Unknowns of the output shaft: its stiffness and damping."""
 TE_OFFSET = "te_offset"
 """Mean rounding error of the engine torque [N m]: what is read is the truth plus this."""
+MAP_POINT = "map_point"
+"""Relative error of the torque at a point of a converter's map, with the index of the point:
+`map_point.3`."""
 LOG_SPECIFIC = ("Tv_over_if", "te_delay", TE_OFFSET)
 """Unknowns that each of several logs has of its own: road, logger and rounding differ."""
 LAW = LAW_KEYS
@@ -181,6 +184,13 @@ def map_log_names(log: int) -> dict[str, str]:
     return {name: f"log{log}.{name}" for name in LOG_SPECIFIC} if log else {}
 
 
+def read_map_changes(point: ParameterVector) -> dict[int, float]:
+    """Read the relative changes of a converter's torque at the points of its map, by index."""
+    values = zip(point.names, point.values.tolist(), strict=True)
+    found = {name.partition("."): value for name, value in values}
+    return {int(key): -value for (stem, _, key), value in found.items() if stem == MAP_POINT}
+
+
 @dataclass(frozen=True)
 class Tie:
     """A known `inertia` J′ [kg m^2] in the gear that `element` makes: Je = J′ - Jo′/i²."""
@@ -200,6 +210,7 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
     the factors by unknown of the difference of the load of this shift from that of its log; empty
     without one. `plant_effect` is an effect that the plant has beside the dual clutch. `partners`
     are the elements whose law an element without a law of its own follows, by its name.
+    `torque_errors` are errors of the engine torque as read per unit of an unknown, by its name.
     """
 
     outputs = COMPARED
@@ -213,6 +224,7 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
     load_factors: Mapping[str, float] = field(default_factory=dict)
     plant_effect: PlantEffect | None = None
     partners: Mapping[str, str] = field(default_factory=dict)
+    torque_errors: Mapping[str, Signal] = field(default_factory=dict)
 
     @property
     def elements(self) -> tuple[ShiftElementKinematics, ShiftElementKinematics]:
@@ -352,10 +364,11 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
         return NetworkTask(elements, acting, start, time, list(COMPARED.values()))
 
     def place_torque(self, point: ParameterVector, read: Signal) -> Signal:
-        """Return the engine torque as it acts: less its mean error, advanced by its delay."""
-        offset = self.get_unknown(TE_OFFSET)
-        error = float(point[offset]) if offset in point.names else 0.0
-        return Signal(read.time, read.values - error, -float(self.get_value(point, "te_delay")))
+        """Return the engine torque as it acts: less its errors, advanced by its delay."""
+        values = read.values
+        for name, one in self.torque_errors.items():
+            values = values - float(point[name]) * np.interp(read.time, one.time, one.values)
+        return Signal(read.time, values, -float(self.get_value(point, "te_delay")))
 
     def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
         """Return the delay [s] of each of `inputs` at `point`."""
@@ -365,16 +378,17 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
     def list_disturbances(
         self, point: ParameterVector, record: TorqueRecord
     ) -> dict[str, Disturbance]:
-        """List delay and mean error of the engine torque, as far as they are unknowns.
+        """List delay and errors of the engine torque, as far as they are unknowns.
 
         The rate is that of the torque without noise: jitter would seem to show a delay.
         """
         found = {}
-        delay, offset = self.get_unknown("te_delay"), self.get_unknown(TE_OFFSET)
+        delay = self.get_unknown("te_delay")
         if delay in point.names:
             found[delay] = Disturbance(ENGINE_TORQUE, record.compute_torque_rate(point[delay]))
-        if offset in point.names:
-            found[offset] = Disturbance(ENGINE_TORQUE, np.full(record.time.size - 1, -1.0))
+        read = 0.5 * (record.time[1:] + record.time[:-1]) + self.get_value(point, "te_delay")
+        for name, one in self.torque_errors.items():
+            found[name] = Disturbance(ENGINE_TORQUE, -np.interp(read, one.time, one.values))
         return found
 
     def describe_input(self, name: str) -> str:

@@ -39,6 +39,7 @@ from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,
     LOAD_DEVIATION,
+    MAP_POINT,
     START,
     TE_OFFSET,
     DualClutchPlant,
@@ -51,7 +52,7 @@ from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
 from drivetwin.shifts.shift import compute_exclusive_spans
-from drivetwin.simulation.dual_clutch import LossLaw
+from drivetwin.simulation.dual_clutch import LossLaw, Signal
 from drivetwin.vehicle.spec import PARTNER_REST_STD, PriorValue, describe_partner_level
 
 
@@ -160,6 +161,7 @@ def build_problem(
     absent = {"eta": not signals[0].scale_known, "J_e": tie is not None}
     names = [n for n in names if not absent.get(n, n in delays)]
     names += [n for n in _expand_logs((TE_OFFSET, AERO), logs) if n in priors]
+    names += [n for n in priors if n.startswith(f"{MAP_POINT}.")]
     fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_fixed(p)}
     load_factors = (
         _build_load_factors(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
@@ -181,6 +183,7 @@ def build_problem(
             s.log,
             own_load,
             partners=partners,
+            torque_errors={n: one for n, one in _list_torque_errors(s).items() if n in names},
         )
         terms.append(RecordedTerm.from_sensor_noise(structure, record))
         first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
@@ -212,6 +215,16 @@ def _add_log_values(guess: Mapping[str, float], logs: Sequence[int]) -> dict[str
         n: guess[name] for log in logs for name, n in map_log_names(log).items() if name in guess
     }
     return own | dict(guess)
+
+
+def _list_torque_errors(signals: ShiftSignals) -> dict[str, Signal]:
+    """List the errors of the engine torque [N m] per unit of the unknowns that a shift may have."""
+    time = signals.engine_torque.time
+    offset = map_log_names(signals.log).get(TE_OFFSET, TE_OFFSET)
+    found = {offset: Signal(time, np.ones(time.size))}
+    of = signals.torque_of_speeds
+    points = {} if of is None else {k: Signal(of.time, one) for k, one in of.points.items()}
+    return found | {f"{MAP_POINT}.{k}": one for k, one in points.items()}
 
 
 def _build_load_factors(signals: Sequence[ShiftSignals]) -> dict[int, dict[str, float]]:
@@ -329,6 +342,9 @@ def _collect_priors(
         rounding = estimate_quantization_error(s.engine_torque, s.torque_resolution)
         if rounding > 0.0:
             found.setdefault(own.get(TE_OFFSET, TE_OFFSET), PriorValue(0.0, rounding))
+        if s.torque_of_speeds is not None:
+            points = s.torque_of_speeds.point_std
+            found |= {f"{MAP_POINT}.{k}": PriorValue(0.0, std) for k, std in points.items()}
     if AERO in guess:
         found[AERO] = PriorValue(0.0, LOAD_BALANCE.aero_std)
     law = {key: PriorValue(*LAW_PRIOR[k]) for k, key in enumerate(LAW)} | FOLLOWER_PRIOR

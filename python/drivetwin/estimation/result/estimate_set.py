@@ -48,6 +48,8 @@ class EstimateSet:
     """Total covariance of parameters and friction laws; likelihood method only."""
     numbers: Mapping[str, CardNumber] = field(default_factory=dict)
     """Number of the card that would narrow each parameter most; likelihood method only."""
+    map_changes: Mapping[int, float] = field(default_factory=dict)
+    """Relative change of the converter's torque at points of its map; likelihood method only."""
 
 
 def _check_excitation(signals: ShiftSignals) -> Finding | None:

@@ -58,9 +58,9 @@ class InitialGuessSettings:
     iterations: int = 3
     """Iterations of the instruments, the slopes expected from the estimate [-]."""
     max_outside: float = 10.0
-    """Factor beyond the design range of J3 from which the balance of the vehicle counts as wrong:
-    without a wheel speed the swing of a soft shaft hides how little the vehicle changes its speed
-    [ratio]."""
+    """Factor beyond the design ranges of J′ and J3 from which a balance counts as wrong: without a
+    wheel speed the swing of a soft shaft hides how little the vehicle changes its speed, and errors
+    of a converter's map over the speed ratio look like an inertia [ratio]."""
     max_damping: float = 0.2
     """Largest damping ratio of the shaft, that of a damped propeller shaft: few samples of a short
     oscillation give larger ones [-]."""
@@ -132,21 +132,24 @@ def _estimate_rigid(
     plain = _estimate_without_torque(signals, driveline, design)
     if not signals.scale_known:
         return plain
-    low, high = (
-        limit * factor
-        for limit, factor in zip(
-            design.J_vehicle_range, (1.0 / GUESS.max_outside, GUESS.max_outside), strict=True
-        )
-    )
     try:
         start = compute_middle(design.J_prime_range)
         balance = estimate_momentum_inertia(signals, driveline, MOMENTUM, start)
         names = ("eta", "J_e", "J_out", "te_delay")
-        plain |= {name: balance.get_value(name) for name in names}
+        found = {name: balance.get_value(name) for name in names}
+        J_prime = found["J_e"] + found["J_out"] / driveline.i_after**2
+        if found["J_out"] > 0.0 and _is_plausible(J_prime, design.J_prime_range):
+            plain |= found
         load, J_vehicle = estimate_load(signals, driveline.i_f)
     except IdentificationError:
         return plain
-    return plain | {LOAD: load, "J_vehicle": J_vehicle} if low < J_vehicle < high else plain
+    is_plausible = _is_plausible(J_vehicle, design.J_vehicle_range)
+    return plain | {LOAD: load, "J_vehicle": J_vehicle} if is_plausible else plain
+
+
+def _is_plausible(inertia: float, limits: Span) -> bool:
+    """Return whether an inertia [kg m^2] is near its design range."""
+    return limits[0] / GUESS.max_outside < inertia < limits[1] * GUESS.max_outside
 
 
 def _estimate_without_torque(
