@@ -130,8 +130,10 @@ class MomentumFit:
         return float(self.fit.theta[self.names.index(name)])
 
 
-def list_momentum_names(driveline: KnownDriveline) -> tuple[str, ...]:
-    """Parameters of the regression: η, Je, Jo′, delay and mean rounding error of T_e, drums."""
+def list_momentum_names(signals: ShiftSignals, driveline: KnownDriveline) -> tuple[str, ...]:
+    """Parameters of the regression: η, Je, Jo′, delay and mean rounding error of T_e, drums, errors
+    of the points of a converter's map."""
+    of_speeds = signals.torque_of_speeds
     return (
         "eta",
         "J_e",
@@ -139,6 +141,7 @@ def list_momentum_names(driveline: KnownDriveline) -> tuple[str, ...]:
         "te_delay",
         "te_rounding",
         *(f"drum.{c.name}" for c in driveline.drums),
+        *(f"map_point.{k}" for k in (() if of_speeds is None else of_speeds.points)),
     )
 
 
@@ -163,7 +166,14 @@ class _Equations:
         counts = [s.windows.count for s in found]
         self.ratio = np.repeat([s.ratio for s in found], counts)
         tied = np.repeat([s.tied for s in found], counts)
-        self.constant = Quadrature(csr_array(0.5 * self.windows.width[:, None]))
+        constant = Quadrature(csr_array(0.5 * self.windows.width[:, None]))
+        self.errors = {ROUNDING: (np.ones(1), constant)}
+        of_speeds = signals.torque_of_speeds
+        if of_speeds is not None:
+            quadrature = build_hann_kernels(of_speeds.time, self.windows).psi
+            first = FIRST_DRUM + len(driveline.drums)
+            points = enumerate(of_speeds.points.values(), start=first)
+            self.errors |= {k: (one, quadrature) for k, one in points}
         self.torque = build_hann_kernels(signals.output_torque.time, self.windows).psi
         self.engine = build_hann_kernels(signals.engine_speed.time, self.windows).slope
         self.output = build_hann_kernels(signals.output_speed.time, self.windows).slope
@@ -210,18 +220,21 @@ class _Equations:
             terms.append(Term(signal.values, signal.sigma, quadrature, factor, slopes))
         return terms
 
-    def rounding(self, theta: FloatArray) -> Term:
-        """The part of the engine torque's mean rounding error, -η·θ[4]."""
-        area, factor = self.constant, np.full_like(self.ratio, -theta[0] * theta[ROUNDING])
-        slopes = {
-            0: (np.full_like(self.ratio, -theta[ROUNDING]), area),
-            ROUNDING: (np.full_like(self.ratio, -theta[0]), area),
-        }
-        return Term(np.ones(1), 0.0, area, factor, slopes)
+    def list_errors(self, theta: FloatArray) -> list[Term]:
+        """The parts of the engine torque's errors, -η·θ[p] of each."""
+        found = []
+        for p, (error, quadrature) in self.errors.items():
+            factor = np.full_like(self.ratio, -theta[0] * theta[p])
+            slopes = {
+                0: (np.full_like(self.ratio, -theta[p]), quadrature),
+                p: (np.full_like(self.ratio, -theta[0]), quadrature),
+            }
+            found.append(Term(error, 0.0, quadrature, factor, slopes))
+        return found
 
     def terms(self, theta: FloatArray) -> list[Term]:
         """Build the terms of the equations at θ, the engine torque first."""
-        return [self.engine_torque(theta), *self.others(theta), self.rounding(theta)]
+        return [self.engine_torque(theta), *self.others(theta), *self.list_errors(theta)]
 
 
 def _build_priors(
@@ -229,7 +242,12 @@ def _build_priors(
 ) -> dict[str, PriorValue]:
     """Build the priors of the parameters, by name."""
     rounding = estimate_quantization_error(signals.engine_torque, signals.torque_resolution)
-    found = {"te_delay": settings.delay_prior, "te_rounding": PriorValue(0.0, rounding)}
+    delay = driveline.known.get("te_delay", settings.delay_prior)
+    found = {"te_delay": delay, "te_rounding": PriorValue(0.0, rounding)}
+    of_speeds = signals.torque_of_speeds
+    if of_speeds is not None:
+        points = of_speeds.point_std.items()
+        found |= {f"map_point.{k}": PriorValue(0.0, std) for k, std in points}
     if driveline.J_out is not None:
         found["J_out"] = driveline.J_out
     return found | {f"drum.{one.name}": one.drum for one in driveline.drums}
@@ -291,7 +309,7 @@ def estimate_momentum_inertia(
     """
     found = find_segments(signals, driveline, settings)
     equations = _Equations(signals, driveline, found)
-    names = list_momentum_names(driveline)
+    names = list_momentum_names(signals, driveline)
     priors = _build_priors(signals, driveline, settings)
     entries = {
         names.index(name): (one.value, _compute_prior_std(one)) for name, one in priors.items()
