@@ -42,9 +42,7 @@ class Converter:
         """Torque that the turbine gives [N m] at speeds of pump and turbine [rad/s], pump > 0."""
         return self.compute_torque_ratio(pump, turbine) * self.compute_pump_torque(pump, turbine)
 
-    def compute_point_torques(
-        self, pump: FloatArray, turbine: FloatArray
-    ) -> dict[int, FloatArray]:
+    def compute_point_torques(self, pump: FloatArray, turbine: FloatArray) -> dict[int, FloatArray]:
         """Derivatives of the turbine's torque (n,) [N m] by the relative change of its value at a
         point of the map, by index; without the points at which the converter never works."""
         at = np.divide(turbine, pump)
