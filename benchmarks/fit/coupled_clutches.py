@@ -157,7 +157,8 @@ def _fit_noisy(
     wanted: dict[str, Output] = {f"w{k}": ("speed", f"J{k}") for k in (1, 2, 3, 4)}
     model = build_model(means, inputs)
     drive = {"drive": inputs["drive"]}  # the forces are exact: as inputs of the model they stay so
-    exact = {one.name: Tolerance(exact=True) for one in model.components}
+    named = ("gain", *(one.name for one in model.components))
+    exact = dict.fromkeys(named, Tolerance(exact=True))
     recording = Recording(drive, outputs, known)
     found = model.fit([recording], unknowns, wanted, tolerances=exact, seed=0)
     return {name: (found.values[name], found.std[name]) for name in TRUTH}

@@ -122,7 +122,8 @@ def _fit_network(
     inputs = {name: Signal(one.time, one.values) for name, one in measured.items()}
     unknowns = _build_unknowns(bench, dual, start)
     model = _build_model(bench, dual, start, inputs)
-    exact = {one.name: Tolerance(exact=True) for one in model.components}
+    named = ("gain", *(one.name for one in model.components))
+    exact = dict.fromkeys(named, Tolerance(exact=True))
     recording = Recording(inputs, outputs)
     functions = _build_expressions(bench, dual)
     given = unknowns, OUTPUTS

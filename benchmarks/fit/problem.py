@@ -16,7 +16,7 @@ from drivetwin.fit.places import Numbers, list_places
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.model_components import Component, Place
 from drivetwin.simulation.dual_clutch import Signal
-from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind
+from drivetwin.simulation.element_schema import ELEMENT_FIELDS, Field, FieldKind, list_inputs
 from drivetwin.simulation.network import Output, Start
 
 SPREAD = 0.3
@@ -119,7 +119,9 @@ class Problem:
         """True numbers that are neither unknown nor exact."""
         model = self.build()
         elements = make_plain([component.element for component in model.components])
-        places = list_places(elements, Start({}), (), {}, {})
+        outputs = {name: one.output for name, one in self.outputs.items()}
+        used = [name for element in elements for name in list_inputs(element)]
+        places = list_places(elements, Start({}), dict.fromkeys(used), {}, outputs)
         return list_fixed(elements, places, self.paths, {})
 
     @property
@@ -239,11 +241,25 @@ def roughen(problem: Problem, rate: float) -> Problem:
     return replace(problem, time=time, inputs=inputs, is_rounded=True)
 
 
+def read_channels(problem: Problem, drawn: Realisation) -> Realisation:
+    """Return a realisation as sensors read it whose gains are off by its moves."""
+    assert drawn.moves is not None
+    inputs, outputs = dict(drawn.inputs), dict(drawn.outputs)
+    for one, move in zip(problem.fixed, drawn.moves.tolist(), strict=True):
+        table, name, *_ = map(str, one.places[0])
+        gain = one.move(1.0, move)
+        if table == "inputs":  # the truth is the gain times the signal that is read
+            inputs[name] = replace(inputs[name], values=inputs[name].values / gain)
+        elif table == "outputs":
+            outputs[name] = gain * outputs[name]
+    return replace(drawn, inputs=inputs, outputs=outputs)
+
+
 def move_fixed(problem: Problem, model: Model, moves: FloatArray) -> None:
-    """Move the fixed numbers of a model from the true to the stated values."""
+    """Move the fixed numbers of the elements of a model from the true to the stated values."""
     numbers = Numbers({"elements": make_plain([one.element for one in model.components])})
     for one, move in zip(problem.fixed, moves.tolist(), strict=True):
-        for place in one.places:
+        for place in one.places if one.places[0][0] == "elements" else ():
             numbers.put(place, one.move(numbers.get(place), move))
     model.components = [
         replace(one, element=element)

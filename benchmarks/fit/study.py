@@ -18,6 +18,7 @@ from benchmarks.fit.problem import (
     Values,
     compute_prior_std,
     move_fixed,
+    read_channels,
     record,
 )
 from benchmarks.fit.problems import build_problem
@@ -192,10 +193,13 @@ def fit_model(
     }
     wanted = {name: one.output for name, one in problem.outputs.items()}
     tolerances = {}
-    if drawn.moves is None:
+    moves = drawn.moves
+    if moves is None:
         tolerances = {one.name: Tolerance(exact=True) for one in model.components}
+        tolerances["gain"] = Tolerance(exact=True)
     else:
-        move_fixed(problem, model, drawn.moves)
+        drawn = read_channels(problem, drawn)
+        move_fixed(problem, model, moves)
     inputs = {
         name: hold_ends(one, LONGEST) if name in problem.delays else one
         for name, one in drawn.inputs.items()

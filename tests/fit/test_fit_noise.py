@@ -3,16 +3,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
+from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording, Samples
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.model import Model
 from drivetwin.simulation.dual_clutch import Signal
+from drivetwin.simulation.network import Output
 
 TRUTH = {"rotor.inertia": 0.8, "fluid.damping": 1.5}
+
+
+SPEED: Mapping[str, Output] = {"w": ("speed", "a")}
+IDEAL = {"gain.motor": Tolerance(exact=True)}
 
 
 def build_stand(torque: Signal) -> Model:
@@ -44,7 +52,7 @@ def test_a_rounded_sensor_is_as_far_off_at_a_level_as_in_one_sample(
     read = Signal(time, torque_read)
     recording = Recording({"motor": read}, {"w": Measured(time, speed_read)})
     unknowns = {name: Unknown(1.3 * value) for name, value in TRUTH.items()}
-    found = build_stand(read).fit(recording, unknowns, {"w": ("speed", "a")}, seed=0)
+    found = build_stand(read).fit(recording, unknowns, SPEED, seed=0)
     for name, value in TRUTH.items():
         assert abs(found.values[name] - value) < 3.0 * found.std[name], name
         assert found.std[name] < 0.06 * value, name
@@ -63,7 +71,7 @@ def test_samples_that_are_means_are_compared_with_means() -> None:
     def fit(samples: Samples) -> ModelFit:
         measured = Measured(fine[::20], speed, 0.01, samples)
         recording = Recording({"motor": torque}, {"w": measured})
-        return build_stand(torque).fit(recording, unknowns, {"w": ("speed", "a")}, seed=0)
+        return build_stand(torque).fit(recording, unknowns, SPEED, tolerances=IDEAL, seed=0)
 
     found = fit(Samples.MEAN)
     assert found.chi2 == pytest.approx(1.0, abs=0.15)
@@ -81,7 +89,7 @@ def test_two_levels_of_an_input_are_those_of_a_switch() -> None:
     speed = speed + 0.02 * np.random.default_rng(5).standard_normal(time.size)
     unknowns = {name: Unknown(1.3 * value) for name, value in TRUTH.items()}
     recording = Recording({"motor": torque}, {"w": Measured(time, speed)})
-    found = build_stand(torque).fit(recording, unknowns, {"w": ("speed", "a")}, seed=0)
+    found = build_stand(torque).fit(recording, unknowns, SPEED, tolerances=IDEAL, seed=0)
     assert found.chi2 == pytest.approx(1.0, abs=0.15)
     for name, value in TRUTH.items():
         assert abs(found.values[name] - value) < 3.0 * found.std[name], name

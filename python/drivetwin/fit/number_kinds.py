@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from drivetwin.channels.roles import Quantity
 from drivetwin.vehicle import spec
 
 
@@ -114,8 +115,27 @@ USUAL: Mapping[str, Mapping[str, UsualDeviation]] = {
 """Usual deviations by type of element and field. The points at which a table is given are exact:
 the values there have the distribution."""
 
-BESIDE: Mapping[str, UsualDeviation] = dict.fromkeys(
-    ("gain", "offset", "delay", "input", "start"), _EXACT
-)
-"""Usual deviations of the numbers beside the elements, by the first name of their path: of a
-channel, of a constant input, of a known start. They are exact unless a tolerance is stated."""
+_GAINS = {
+    "inputs": UsualDeviation(spec.ENGINE_TORQUE_STD),
+    "outputs": UsualDeviation(spec.TORQUE_METER_STD),
+}
+
+
+def get_usual_beside(head: str, table: str, quantity: Quantity | None = None) -> UsualDeviation:
+    """Return the usual deviation of a number beside the elements.
+
+    Parameters
+    ----------
+    head
+        First name of its path: `gain`, `offset` or `delay` of a channel, `input` or `start`.
+    table
+        `inputs` or `outputs` of a channel.
+    quantity
+        Quantity of the channel.
+
+    Returns
+    -------
+    UsualDeviation
+        Exact but for the gain of a torque.
+    """
+    return _GAINS[table] if head == "gain" and quantity is Quantity.TORQUE else _EXACT

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.errors import InputError, suggest_spelling
-from drivetwin.fit.number_kinds import BESIDE, USUAL, UsualDeviation
+from drivetwin.fit.number_kinds import USUAL, UsualDeviation, get_usual_beside
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit, is_number
 from drivetwin.simulation.element_schema import Field as ElementField
@@ -89,18 +89,28 @@ def _list_channels(table: str, quantities: Mapping[str, Quantity]) -> list[Place
             value,
             {"gain": "1", "offset": quantity.unit, "delay": "s"}[head],
             known=table == "inputs" and head == "delay",
+            quantity=quantity,
         )
         for name, quantity in quantities.items()
         for head, value in CHANNEL.items()
     ]
 
 
-def _make_place(head: str, keys: Keys, value: float, unit: str, *, known: bool = True) -> Place:
+def _make_place(
+    head: str,
+    keys: Keys,
+    value: float,
+    unit: str,
+    *,
+    known: bool = True,
+    quantity: Quantity | None = None,
+) -> Place:
     limit = Limit(None, 0.0, None, ()) if head == "gain" else None
     schema = ElementField(
         FieldKind.NUMBER, False, None, value, known, unit, limit, (), (), f"{head} of {keys[1]}"
     )
-    return Place(f"{head}.{keys[1]}", keys, head, schema, value, BESIDE[head])
+    usual = get_usual_beside(head, str(keys[0]), quantity)
+    return Place(f"{head}.{keys[1]}", keys, head, schema, value, usual)
 
 
 def find_place(path: str, places: Mapping[str, Place]) -> Place:

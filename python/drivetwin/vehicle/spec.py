@@ -231,6 +231,11 @@ partner [-]; engineering estimate."""
 CONVERTER_POINT_STD = 0.03
 """Standard deviation of a point of a converter map [ratio]; engineering estimate: test benches,
 reading of a diagram."""
+ENGINE_TORQUE_STD = 0.01
+"""Standard deviation of the gain of an engine torque [ratio]: calibrated torque models of engine
+controllers are within a few per cent."""
+TORQUE_METER_STD = 0.005
+"""Standard deviation of the gain of a torque meter [ratio]: installed ones have 0.1 to 1 %."""
 CONVERTER_SCALE_STD = 0.03
 """Standard deviation of the scale that all capacities of a converter share [ratio]; engineering
 estimate: oil temperature, production scatter."""

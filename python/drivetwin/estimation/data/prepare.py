@@ -41,7 +41,15 @@ from drivetwin.shifts.lockup_clutch import (
     require_locked_converter,
 )
 from drivetwin.shifts.shift import RejectedShift, Shift, get_shift_pressures
-from drivetwin.vehicle.spec import CONVERTER_POINT_STD, PriorValue, SensorTolerance, multiply
+from drivetwin.vehicle.spec import (
+    CONVERTER_POINT_STD,
+    CONVERTER_SCALE_STD,
+    ENGINE_TORQUE_STD,
+    TORQUE_METER_STD,
+    PriorValue,
+    SensorTolerance,
+    multiply,
+)
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 MIN_SAMPLES = 10
@@ -409,16 +417,13 @@ def collect_tolerances(
     return _collect_tolerances(log, refer_to_turbine(log, card, shift), card)
 
 
-USUAL_GAINS = {"engine_torque": 0.01, "output_torque": 0.005}
-"""Gain tolerances of torque sensors of which the card states none: calibrated torque models of
-engine controllers are within a few per cent, installed torque meters within 0.1 to 1 %."""
-USUAL_MAP_GAIN = 0.03
-"""Gain tolerance of a torque that follows from the map of a converter."""
+USUAL_GAINS = {"engine_torque": ENGINE_TORQUE_STD, "output_torque": TORQUE_METER_STD}
+"""Gain tolerances of torque sensors of which the card states none."""
 
 
 def get_usual_gains(log: ShiftLog, card: VehicleCard, *, turbine_driven: bool) -> dict[str, float]:
     """Return the usual gain tolerances by role of the sensors of which the card states none."""
-    usual = USUAL_GAINS | ({"engine_torque": USUAL_MAP_GAIN} if turbine_driven else {})
+    usual = USUAL_GAINS | ({"engine_torque": CONVERTER_SCALE_STD} if turbine_driven else {})
     return {one: gain for one, gain in usual.items() if one in log and one not in card.sensors}
 
 
