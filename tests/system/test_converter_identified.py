@@ -54,5 +54,6 @@ def test_a_map_that_is_off_at_each_point_is_corrected(card: str) -> None:
         interval = named[name].ci95_total
         assert interval is not None
         assert interval[0] < truth[name]["value"] < interval[1], name
-    assert vehicle.converter is not None and found.twin.converter is not None
+    assert vehicle.converter is not None
+    assert found.twin.converter is not None
     assert found.twin.converter.capacity != vehicle.converter.capacity
