@@ -31,8 +31,9 @@ from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import Grid, calibrate_map
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
-from drivetwin.cli.identify import IdentifyOptions, read_shifts
+from drivetwin.cli.identify import load_identified_card, read_shifts
 from drivetwin.cli.output import Remaining
+from drivetwin.cli.requests.identification import IdentifyOptions
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
@@ -140,7 +141,7 @@ def make_bench(folder: Path, scenario: str, seed: int = 0) -> Bench:
     made = run(load_scenario(scenario), seed)
     path, card_path, _ = write_run(folder / f"{scenario}-{seed}.csv", made)
     how = IdentifyOptions(vehicle=card_path, method=Method.LIKELIHOOD)
-    card = how.load_card()
+    card = load_identified_card(how)
     log, shifts, _ = read_shifts(path, how, card)
     return Bench(Source(log, shifts), card)
 

@@ -56,7 +56,7 @@ def test_errors_and_findings_of_the_python_interface_name_no_options() -> None:
             left.append((name, text))
     # The table of words, keys of options, declarations of options, and notes of `inspect`.
     allowed = {"errors", "vehicle/effects", "logs/survey"}
-    allowed |= {"_util/request", "export/write", "vehicle/card_fields"}
+    allowed |= {"_util/request", "export/targets", "vehicle/card_fields"}
     assert [one for one in left if one[0] not in allowed] == []
 
 

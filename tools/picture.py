@@ -13,7 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from drivetwin.cli.identify import IdentifiedLog, IdentifyOptions, run_identification
+from drivetwin.cli.identify import IdentifiedLog, run_identification
+from drivetwin.cli.requests.identification import IdentifyOptions
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import load_scenario

@@ -20,7 +20,6 @@ from typer.core import TyperGroup
 from drivetwin._util.request import COMMANDS as REQUESTS
 from drivetwin._util.request import Request, get_arguments
 from drivetwin.cli import app, main
-from drivetwin.cli.command_group import EXAMPLES
 from drivetwin.errors import InputError
 
 
@@ -44,7 +43,9 @@ def test_a_group_without_a_command_prints_its_help(
     assert "\nCommands:\n" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("name", "call"), [(k, one) for k in EXAMPLES for one in EXAMPLES[k]])
+@pytest.mark.parametrize(
+    ("name", "call"), [(k, one) for k in REQUESTS for one in REQUESTS[k].examples]
+)
 def test_every_example_is_a_call_of_its_command(name: str, call: str) -> None:
     assert main_parses(shlex.split(call)) == name
 

@@ -298,7 +298,9 @@ COMMANDS: dict[str, type[Request]] = {}
 class Request:
     """Base of requests, whose subclasses are frozen dataclasses with keyword arguments.
 
-    The request of a command names it: `class Reduce(Request, command="reduce")`.
+    The request of a command names it, the function that runs it and typical calls:
+    `class Reduce(Request, command="reduce", runs="gearbox:reduce", examples=("reduce box",))`. Its
+    docstring is the help of the command.
     Values are checked against the limits of their declarations. The methods of a dataclass are
     stated here once: generating them for each command would slow down every start of the program.
     """
@@ -306,10 +308,23 @@ class Request:
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     command_name: ClassVar[str] = ""
     """Name of the command, of which `fleet run` has two words."""
+    runs: ClassVar[str] = ""
+    """Module below `drivetwin.cli` and function that run the command."""
+    examples: ClassVar[tuple[str, ...]] = ()
+    """Arguments of typical calls."""
+    has_document: ClassVar[bool] = True
+    """False for a command without a result for programs."""
 
-    def __init_subclass__(cls, command: str = "") -> None:
+    def __init_subclass__(
+        cls,
+        command: str = "",
+        runs: str = "",
+        examples: tuple[str, ...] = (),
+        has_document: bool = True,
+    ) -> None:
         if command:
-            cls.command_name = command
+            cls.command_name, cls.runs = command, runs
+            cls.examples, cls.has_document = examples, has_document
             COMMANDS[command] = cls
         dataclass(init=False, repr=False, eq=False, match_args=False, kw_only=True)(cls)
 

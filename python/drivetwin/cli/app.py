@@ -10,56 +10,64 @@ from typing import Annotated, Any
 
 import typer
 
-from drivetwin.cli.calibrate import calibrate
-from drivetwin.cli.card import card
+from drivetwin._util.request import Request
 from drivetwin.cli.command_group import PLAIN, CommandGroup, Entry
-from drivetwin.cli.examine import examine
-from drivetwin.cli.export import export
-from drivetwin.cli.fit import fit
-from drivetwin.cli.fleet import fleet
-from drivetwin.cli.gearbox import drive, gearbox, reduce
-from drivetwin.cli.identify import identify
-from drivetwin.cli.inspect import inspect
-from drivetwin.cli.observe import observe
 from drivetwin.cli.output import show_error
-from drivetwin.cli.report import report
-from drivetwin.cli.schema import schema
-from drivetwin.cli.shifts import shifts
-from drivetwin.cli.simulate import simulate
-from drivetwin.cli.synth import demo, synth
-from drivetwin.cli.try_controller import try_controller
-from drivetwin.cli.workbench import workbench
+from drivetwin.cli.requests import desk, identification, use
 from drivetwin.errors import INTERRUPTED, DrivetwinError, InputError, Where
 
-COMMANDS: dict[str, Entry] = {
-    "demo": demo,
-    "synth": synth,
-    "inspect": inspect,
-    "shifts": shifts,
-    "identify": identify,
-    "examine": examine,
-    "fit": fit,
-    "simulate": simulate,
-    "observe": observe,
-    "calibrate": calibrate,
-    "try": try_controller,
-    "report": report,
-    "export": export,
-    "gearbox": gearbox,
-    "reduce": reduce,
-    "drive": drive,
-    "schema": schema,
-    "app": workbench,
-    "fleet": fleet,
-    "card": card,
+
+class LogsOrCommand(CommandGroup):
+    """`drivetwin fleet LOGS` is `drivetwin fleet run LOGS`: what is no command is a log."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put in the command that is meant."""
+        if args and args[0] not in (*self.commands, "--help"):
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+_GROUPS: dict[str, tuple[type[CommandGroup], str]] = {
+    "fleet": (
+        LogsOrCommand,
+        "Identify many logs into a store; report, estimate and query it. Runs can be resumed.",
+    ),
+    "card": (CommandGroup, "Write or check a vehicle card."),
 }
+"""Class and help of the commands of two words."""
+
+
+def list_entries() -> dict[str, Entry]:
+    """List the commands and their groups by name, in the order of their requests."""
+    entries: dict[str, Entry] = {}
+    inner: dict[str, dict[str, Entry]] = {}
+    for request in _list_requests():
+        first, _, second = request.command_name.partition(" ")
+        if not second:
+            entries[first] = request
+            continue
+        members = inner.setdefault(first, {})
+        members[second] = request
+        kind, help = _GROUPS[first]
+        entries[first] = kind(name=first, entries=members, help=help)
+    return entries
+
+
+def _list_requests() -> list[type[Request]]:
+    return [
+        one
+        for module in (identification, use, desk)
+        for one in vars(module).values()
+        if isinstance(one, type) and issubclass(one, Request) and one.__module__ == module.__name__
+        if one.runs
+    ]
 
 
 class Program(CommandGroup):
     """The commands of the program."""
 
     def __init__(self, **attributes: Any) -> None:
-        super().__init__(entries=COMMANDS, **attributes)
+        super().__init__(entries=list_entries(), **attributes)
 
 
 app = typer.Typer(

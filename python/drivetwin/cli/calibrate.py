@@ -10,19 +10,36 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
-from drivetwin._util.request import CELSIUS, REQUIRED, flag, input_file, option, output_folder
+from drivetwin._util.atomic import compute_digest, write_text
+from drivetwin._util.optional_dependencies import get_program_version
+from drivetwin._util.plain_values import format_json
+from drivetwin._util.request import CELSIUS
+from drivetwin.calibration.calibrate import Calibration, Task
+from drivetwin.calibration.calibrate import calibrate as run_calibration
+from drivetwin.calibration.front import Front, trace_front
+from drivetwin.calibration.guarded_controller import run_guarded
+from drivetwin.calibration.identified_range import check_identified_range
+from drivetwin.calibration.keep_limits import require_limits
+from drivetwin.calibration.learn import Correction
+from drivetwin.calibration.maneuver import OperatingPoint
+from drivetwin.calibration.operating_map import Grid, OperatingMap, calibrate_map
 from drivetwin.calibration.options import CalibrationOptions
+from drivetwin.calibration.policies import own
 from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.policies.own import UserController
+from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.twin_task import Request, build_task, choose_start
 from drivetwin.cli.calibrate_logs import (
     correct_by_logs,
     list_log_findings,
     load_starts,
     to_correction_document,
 )
-from drivetwin.cli.options import RESULT, TWIN, TwinInput
-from drivetwin.cli.output import print_line, show_step
+from drivetwin.cli.export import parse_gears
+from drivetwin.cli.options import RESULT, TWIN
+from drivetwin.cli.output import print_line, show_step, write_atomically
+from drivetwin.cli.requests.use import Calibrate
 from drivetwin.errors import (
     CompilerError,
     ControllerError,
@@ -32,10 +49,43 @@ from drivetwin.errors import (
     InputError,
     Where,
 )
+from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.export.compiler import compile_library, detect_platform
+from drivetwin.export.parameters.files import (
+    ParameterFormat,
+    apply_template,
+    read_template,
+    require_labels,
+    show_units,
+    write_parameters,
+)
+from drivetwin.export.parameters.of_twin import collect_calibration
+from drivetwin.files.calibration_file import (
+    Provenance,
+    build_calibration_document,
+    build_calibration_file,
+    build_certificate_document,
+    write_calibration_file,
+)
+from drivetwin.files.limits_file import (
+    Requirements,
+    build_user_controller,
+    load_controller_file,
+    load_limits,
+)
+from drivetwin.files.records import dump_findings
+from drivetwin.files.result_file import load_result
+from drivetwin.files.twin_file import load_twin, save_twin
+from drivetwin.findings import Finding
 from drivetwin.report.blocks import Block, Outcome
+from drivetwin.report.calibration import build_calibration_blocks, build_calibration_page
+from drivetwin.report.correction import build_correction_blocks
+from drivetwin.report.html import save_page
+from drivetwin.report.model_verdict import explain_result
+from drivetwin.twin.twin import Twin
 
-if TYPE_CHECKING:
-    from drivetwin.calibration.policies.own import UserController
+CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "report.html"
+Results = tuple[Calibration, Front | None, OperatingMap | None]
 
 
 @contextmanager
@@ -44,10 +94,6 @@ def compile_controller(path: Path, *, bench: bool = False) -> Iterator[UserContr
 
     Errors of the controller name its source. Warnings that the file asks for go to stderr.
     """
-    from drivetwin.calibration.policies import own
-    from drivetwin.export.compiler import compile_library, detect_platform
-    from drivetwin.files.limits_file import build_user_controller, load_controller_file
-
     content = load_controller_file(path)
     sources = [one.resolve() for one in content.list_sources(path)]
     folders = [own.HEADER.parent, *((path.parent / one).resolve() for one in content.include)]
@@ -77,77 +123,8 @@ def compile_controller(path: Path, *, bench: bool = False) -> Iterator[UserContr
             raise replace(error, where=where) from None
 
 
-if TYPE_CHECKING:
-    from drivetwin.calibration.calibrate import Calibration
-    from drivetwin.calibration.front import Front
-    from drivetwin.calibration.learn import Correction
-    from drivetwin.calibration.operating_map import Grid, OperatingMap
-    from drivetwin.calibration.policies.own import UserController
-    from drivetwin.calibration.twin_task import Request
-    from drivetwin.findings import Finding
-    from drivetwin.twin.twin import Twin
-
-    Results = tuple[Calibration, Front | None, OperatingMap | None]
-
-CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "report.html"
-
-
-class CalibrationFiles(TwinInput):
-    """Shift, output folder and limits of a calibration."""
-
-    shift: str = option("Shift to calibrate, such as 2-3.", metavar="GEAR-GEAR", default=REQUIRED)
-    output: Path = output_folder("Folder for the results.", default=REQUIRED)
-    limits: Path | None = input_file("Limits and spread (TOML).")
-
-
-class Calibrate(CalibrationOptions, CalibrationFiles, command="calibrate"):
-    """Arguments of `calibrate`."""
-
-    controller: Path | None = input_file(
-        "Parameter file of your own controller in C; the policy is then own."
-    )
-    start: tuple[Path, ...] = input_file(
-        "Earlier calibration.toml as the start (may be repeated with --from-logs: each calibration "
-        "that a log was driven with, the last one last).",
-        default=(),
-    )
-    effort: float = option(
-        "Factor on the length of the search.", minimum=0.05, maximum=20.0, default=1.0
-    )
-    draws: int = option("Number of fresh draws of the certificate.", minimum=59, default=2000)
-    front: bool = flag("Add the front of comfort, friction energy and time.", decides=False)
-    grid: str | None = option(
-        "Grid of operating points, such as torque=800:1400:3,speed=1600:2000:3 (N·m, rpm; from, "
-        "to, points); ,oil=40:100:3 (°C) adds the oil temperature.",
-        "--map",
-        metavar="GRID",
-        decides=False,
-    )
-    template: Path | None = input_file(
-        "Template of the parameter files: labels, units, axes and breakpoints (TOML)."
-    )
-    from_logs: tuple[Path, ...] = input_file(
-        "Log of the vehicle's shifts with an earlier calibration (may be repeated): it corrects "
-        "the twin. With --start the calibration is polished from there, not searched.",
-        metavar="LOG",
-        default=(),
-    )
-
-
 def calibrate(request: Calibrate) -> Outcome:
-    """Find shift profiles with a small peak jerk over production scatter.
-
-    Minimise the tail mean of peak jerk under limits, and certify the result on fresh draws. Write
-    calibration.toml, certificate.json, report.html, and calibration.csv, .dcm and .cdfx into DIR;
-    with --from-logs also the corrected twin.toml.
-    Where a limit is out of reach, the best calibration found is written and the exit code is 2.
-    """
-    from drivetwin.calibration.identified_range import check_identified_range
-    from drivetwin.files.calibration_file import build_calibration_document
-    from drivetwin.files.records import dump_findings
-    from drivetwin.report.calibration import build_calibration_blocks
-    from drivetwin.report.correction import build_correction_blocks
-
+    """Calibrate a shift, with front, map and correction by logs on request; write all files."""
     if request.controller is not None:
         request = replace(request, policy=PolicyKind.OWN)
     model = load_valid_twin(request.twin)
@@ -177,8 +154,6 @@ def calibrate(request: Calibrate) -> Outcome:
 
 def _find_excess(found: Calibration, output: Path) -> DrivetwinError | None:
     """Return the error of a calibration that exceeds a limit, which names its file."""
-    from drivetwin.calibration.keep_limits import require_limits
-
     try:
         require_limits(found.after.certificate.limits, found.before.certificate.limits)
     except InfeasibleError as error:
@@ -190,11 +165,6 @@ def _build_request(
     request: Calibrate, twin: Twin, controller: UserController | None
 ) -> tuple[Request, Correction | None]:
     """Build the task from options and files; correct the twin by logs if there are any."""
-    from drivetwin.calibration.settings import CalibrationSettings
-    from drivetwin.calibration.twin_task import Request, choose_start
-    from drivetwin.cli.export import parse_gears
-    from drivetwin.files.limits_file import Requirements, load_limits
-
     given = Requirements(()) if request.limits is None else load_limits(request.limits)
     gears, logs = parse_gears(request.shift), request.from_logs
     usual = CalibrationSettings().scale_effort(request.effort)
@@ -227,8 +197,6 @@ def _build_request(
 
 def _calibrate(twin: Twin, request: Request, wanted: tuple[str | None, bool]) -> Results:
     """Calibrate, with map and front if wanted; in a child process with a controller in C."""
-    from drivetwin.calibration.guarded_controller import run_guarded
-
     with show_step(f"calibrating {'-'.join(request.gears)} of {twin.name}"):
         if request.controller is None:
             return _compute(twin, request, wanted)
@@ -239,10 +207,6 @@ def _calibrate(twin: Twin, request: Request, wanted: tuple[str | None, bool]) ->
 
 def _compute(twin: Twin, request: Request, wanted: tuple[str | None, bool]) -> Results:
     """Compute the calibration, with the map and the front if wanted."""
-    from drivetwin.calibration.calibrate import calibrate as run_calibration
-    from drivetwin.calibration.front import trace_front
-    from drivetwin.calibration.twin_task import build_task
-
     grid, front = wanted
     mapped = None if grid is None else _calibrate_grid(twin, request, grid)
     found = mapped.main if mapped else run_calibration(build_task(twin, request))
@@ -250,10 +214,6 @@ def _compute(twin: Twin, request: Request, wanted: tuple[str | None, bool]) -> R
 
 
 def _calibrate_grid(twin: Twin, request: Request, text: str) -> OperatingMap:
-    from drivetwin.calibration.calibrate import Task
-    from drivetwin.calibration.maneuver import OperatingPoint
-    from drivetwin.calibration.operating_map import calibrate_map
-    from drivetwin.calibration.twin_task import build_task
 
     if request.engine_torque is not None or request.engine_speed is not None:
         raise InputError(
@@ -276,8 +236,6 @@ def parse_grid(text: str) -> Grid:
 
     Raises InputError for another format.
     """
-    from drivetwin.calibration.operating_map import Grid
-
     axes = (rf"{name}=([^:,]+):([^:,]+):(\d{{1,2}})" for name in ("torque", "speed"))
     pattern = re.compile(",".join(axes) + r"(?:,oil=([^:,]+):([^:,]+):(\d{1,2}))?")
     found = pattern.fullmatch(text.replace(" ", ""))
@@ -305,11 +263,6 @@ def _divide(first: float, last: float, count: int) -> tuple[float, ...]:
 
 def load_valid_twin(source: Path) -> Twin:
     """Load a twin; raises IdentificationError where its result says that it is not valid."""
-    from drivetwin.estimation.result.method import ModelStatus
-    from drivetwin.files.result_file import load_result
-    from drivetwin.files.twin_file import load_twin
-    from drivetwin.report.model_verdict import explain_result
-
     model = load_twin(source)
     result = source.with_name(RESULT)
     if source.name == TWIN and result.is_file():
@@ -326,28 +279,6 @@ def _write_results(
     shown: tuple[tuple[Finding, ...], list[Block]],
     origin: tuple[Twin, Request],
 ) -> tuple[Path, ...]:
-    from drivetwin._util.atomic import compute_digest, write_text
-    from drivetwin._util.optional_dependencies import get_program_version
-    from drivetwin._util.plain_values import format_json
-    from drivetwin.cli.output import write_atomically
-    from drivetwin.export.parameters.files import (
-        ParameterFormat,
-        apply_template,
-        read_template,
-        require_labels,
-        show_units,
-        write_parameters,
-    )
-    from drivetwin.export.parameters.of_twin import collect_calibration
-    from drivetwin.files.calibration_file import (
-        Provenance,
-        build_calibration_file,
-        build_certificate_document,
-        write_calibration_file,
-    )
-    from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.calibration import build_calibration_page
-    from drivetwin.report.html import save_page
 
     (found, front, mapped), (twin, task) = results, origin
     sources = (request.twin, *request.from_logs)

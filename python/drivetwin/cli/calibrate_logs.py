@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.cli.options import read_twin_log
+from drivetwin.cli.input_files import read_twin_log
 from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
 

@@ -6,59 +6,45 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from drivetwin._util.request import Request, input_file, option, output_folder
-from drivetwin.cli.options import card_option, log_argument, mapping_option, strict_flag
-from drivetwin.cli.output import show_step
+from drivetwin._util.display_units import format_uncertainty, get_display_unit
+from drivetwin.cli.fit import fit_logs
+from drivetwin.cli.identify import (
+    IdentifiedLog,
+    build_outcome,
+    run_identification,
+    write_outcome,
+)
+from drivetwin.cli.output import show_step, write_texts
+from drivetwin.cli.requests.identification import Examine, Fit, IdentifyOptions
 from drivetwin.errors import InputError
+from drivetwin.estimation.analysis.experiment_design import compute_rankings
+from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
+from drivetwin.estimation.analysis.profile_likelihood import Profile, compute_profile
+from drivetwin.estimation.data.prepare import collect_tolerances
+from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.files.analysis_files import (
+    format_friction,
+    format_improvements,
+    format_profile,
+    format_suggestions,
+)
+from drivetwin.fit import examine as of_fit
+from drivetwin.fit.examine import REPEATS, Improvement, rank_improvements
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import Block, Cell, Outcome, TableBlock, make_table
-
-if TYPE_CHECKING:
-    from drivetwin.cli.identify import IdentifiedLog
-    from drivetwin.estimation.analysis.profile_likelihood import Profile
-    from drivetwin.fit.examine import Improvement
-    from drivetwin.twin.twin import Twin
+from drivetwin.report.sections.parameters import build_suggestion_blocks, format_half_width
+from drivetwin.report.sections.summary import build_friction_table
+from drivetwin.twin.build import build_twin
+from drivetwin.twin.twin import Twin
 
 SUGGESTIONS, FRICTION = "suggestions.json", "friction.json"
 
 
-class Examine(Request, command="examine"):
-    """Arguments of `examine`."""
-
-    log: Path = log_argument()
-    vehicle: Path | None = card_option()
-    model: Path | None = input_file(
-        "Model file of 'drivetwin fit', in place of a card.",
-        "MODEL",
-        excludes=("vehicle", "channels", "friction"),
-    )
-    channels: Path | None = mapping_option()
-    profile: tuple[str, ...] = option(
-        "Compute the profile likelihood of a parameter, such as J_out.",
-        metavar="PARAMETER",
-        default=(),
-    )
-    seed: int = option("Seed of the starts of a model's fit.", minimum=0, default=0)
-    friction: FrictionShape | None = option(
-        "Estimate friction over slip as a curve of this shape instead of the Stribeck law."
-    )
-    strict: bool = strict_flag("the model is valid, limits included")
-    output: Path | None = output_folder("Folder for the files.")
-
-
 def examine(request: Examine) -> Outcome:
-    """Recommend the test that reduces parameter uncertainty most, and test the intervals.
-
-    The log is first identified by the likelihood method. The command lists the experiments that
-    narrow weak, not identifiable and least known parameters, with the expected intervals. Options
-    add the profile likelihood, and friction curves of free or monotone shape with a twin. With a
-    model file the log is fitted as by 'drivetwin fit', and all but the friction curves apply. The
-    folder of -o also has the files that identify or fit writes.
-    """
+    """Identify or fit a log, and answer what is asked about the result."""
     for name in request.profile if request.model is None else ():
         get_parameter_spec(name)
     if (request.model is None) == (request.vehicle is None):
@@ -67,7 +53,7 @@ def examine(request: Examine) -> Outcome:
     answers, outcome = examined(request)
     files = outcome.files
     if request.output is not None:
-        files = (*files, *_write_outputs(request.output, answers))
+        files = (*files, *write_texts(request.output, {one.file: one.text for one in answers}))
     document = {one.file: json.loads(one.text) for one in answers}
     blocks = [*outcome.blocks[:1], *(block for one in answers for block in one.blocks)]
     return Outcome(blocks, document, files, outcome.is_confirmed)
@@ -85,17 +71,6 @@ class Answer:
 
 def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
     """Identify a log; return every answer in the order of printing, and the identification."""
-    from drivetwin.cli.identify import (
-        IdentifyOptions,
-        build_outcome,
-        run_identification,
-        write_outcome,
-    )
-    from drivetwin.estimation.analysis.experiment_design import compute_rankings
-    from drivetwin.estimation.analysis.profile_likelihood import compute_profile
-    from drivetwin.files import analysis_files
-    from drivetwin.report.sections.parameters import build_suggestion_blocks
-
     assert request.vehicle is not None
     how = IdentifyOptions(vehicle=request.vehicle, channels=request.channels)
     made = run_identification(request.log, how)
@@ -105,7 +80,7 @@ def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
     answers = [
         Answer(
             SUGGESTIONS,
-            analysis_files.format_suggestions(suggestions),
+            format_suggestions(suggestions),
             build_suggestion_blocks(suggestions, found.estimates),
         ),
         *_iterate_profiles(found, request, compute_profile),
@@ -120,13 +95,6 @@ def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
 
 def _identify_friction(outcome: IdentifiedLog, shape: FrictionShape) -> Answer:
     """Friction of a shape, with the twin that has it."""
-    from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
-    from drivetwin.estimation.data.prepare import collect_tolerances
-    from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-    from drivetwin.files.analysis_files import format_friction
-    from drivetwin.report.sections.summary import build_friction_table
-    from drivetwin.twin.build import build_twin
-
     found = outcome.found
     with show_step(f"fitting {shape} friction"):
         tolerances = collect_tolerances(outcome.log, outcome.card, found.shifts[0])
@@ -136,17 +104,8 @@ def _identify_friction(outcome: IdentifiedLog, shape: FrictionShape) -> Answer:
     return Answer(FRICTION, format_friction(one), [build_friction_table(one.curves)], twin)
 
 
-def _write_outputs(folder: Path, answers: Sequence[Answer]) -> tuple[Path, ...]:
-    """Write the answers, all or none."""
-    from drivetwin.cli.output import write_texts
-
-    return write_texts(folder, {one.file: one.text for one in answers})
-
-
 def _build_profile_table(one: Profile, unit: str) -> TableBlock:
     """Build the table of both intervals of a profile."""
-    from drivetwin._util.display_units import format_uncertainty, get_display_unit
-
     display = get_display_unit(unit)
     half = 0.5 * (one.linear[1] - one.linear[0]) * display.factor
     rows = [
@@ -159,10 +118,6 @@ def _build_profile_table(one: Profile, unit: str) -> TableBlock:
 
 def _examine_fit(request: Examine) -> tuple[list[Answer], Outcome]:
     """Fit a model to a log; return every answer in the order of printing, and the fit."""
-    from drivetwin.cli.fit import Fit, fit_logs
-    from drivetwin.files import analysis_files
-    from drivetwin.fit.examine import compute_profile, rank_improvements
-
     assert request.model is not None
     how = Fit(model=request.model, logs=(request.log,), seed=request.seed, output=request.output)
     found, outcome = fit_logs(how)
@@ -171,10 +126,10 @@ def _examine_fit(request: Examine) -> tuple[list[Answer], Outcome]:
     answers = [
         Answer(
             SUGGESTIONS,
-            analysis_files.format_improvements(improvements, units),
+            format_improvements(improvements, units),
             [_build_improvement_table(improvements, units)],
         ),
-        *_iterate_profiles(found, request, compute_profile),
+        *_iterate_profiles(found, request, of_fit.compute_profile),
     ]
     return answers, outcome
 
@@ -183,19 +138,15 @@ def _iterate_profiles(
     found: Any, request: Examine, compute_profile: Callable[[Any, str], Profile]
 ) -> Iterator[Answer]:
     """Yield the profiles of a fit, by the function for its kind of model."""
-    from drivetwin.files import analysis_files
-
     units = {name: one.unit for name, one in found.estimates.items()}
     for name in request.profile:
         with show_step(f"profile likelihood of {name}"):
             one = compute_profile(found, name)
-        text = analysis_files.format_profile(one, units[name])
+        text = format_profile(one, units[name])
         yield Answer(f"profile.{name}.json", text, [_build_profile_table(one, units[name])])
 
 
 def _build_improvement_table(found: Sequence[Improvement], units: Mapping[str, str]) -> TableBlock:
-    from drivetwin.fit.examine import REPEATS
-    from drivetwin.report.sections.parameters import format_half_width
 
     rows = []
     for one in found:

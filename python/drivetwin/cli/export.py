@@ -4,58 +4,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from drivetwin._util.request import Output, Shape, flag, input_file, option, output_file
-from drivetwin.cli.options import mapping_option, read_twin_log, result_argument
+from drivetwin._util.atomic import write_text
+from drivetwin.cli.input_files import read_twin_log
 from drivetwin.cli.output import show_step
+from drivetwin.cli.requests.use import Export
 from drivetwin.errors import InputError
+from drivetwin.export.entries import build_subject
+from drivetwin.export.fmu.build import build_measured_subject, format_inputs
+from drivetwin.export.parameters.of_twin import collect_estimates
 from drivetwin.export.targets import Target
-from drivetwin.export.write import ExportedModel, ExportOptions, write_content, write_export
+from drivetwin.export.write import ExportedModel, write_content, write_export
 from drivetwin.report.blocks import Outcome, TextBlock
-
-if TYPE_CHECKING:
-    from drivetwin.report.results import MadeResult
-    from drivetwin.twin.twin import Twin
-
-
-class Export(ExportOptions, command="export"):
-    """Arguments of `export`."""
-
-    twin: Path = result_argument()
-    output: Path | None = output_file(
-        "File, or folder for c; default: ./TWIN.FORMAT.", "PATH", shape=Shape.EITHER
-    )
-    shift: str | None = option(
-        "For models: shift, such as 2-3; default: the first upshift.", metavar="GEAR-GEAR"
-    )
-    log: Path | None = input_file(
-        "For models: log with the initial state; fmu and modelica contain its shift.", "LOG"
-    )
-    inputs: Path | None = option(
-        "For models, with --log: also write the inputs of the log's shift as the model takes them "
-        "(CSV), delays removed.",
-        metavar="FILE",
-        output=Output(),
-        needs=("log",),
-    )
-    as_logged: bool = flag(
-        "For models, with --log: take inputs as the log shows them. The model delays the earlier "
-        "inputs, and its outputs are later by the largest delay.",
-        needs=("log",),
-    )
-    channels: Path | None = mapping_option(needs=("log",))
+from drivetwin.report.results import MadeResult, open_result
+from drivetwin.twin.twin import Twin
 
 
 def export(request: Export) -> Outcome:
-    """Write the identified model for another program.
-
-    c: C99 sources for a controller. fmu: co-simulation FMU with sources. modelica: package of
-    components of the Standard Library. ssv, cdfx, dcm, m, csv: parameter files with units and
-    intervals, of the results of bus logs and of fits too.
-    """
-    from drivetwin.report.results import open_result
-
+    """Write the twin, or the estimates of a result without one."""
     made, to = open_result(request.twin), request.to
     request.refuse_stated(_list_unused(to), f"--to {to.value} does not use it")
     path = request.output or Path(f"{request.twin.stem}.{to.ending}")
@@ -83,8 +49,6 @@ def _list_unused(to: Target) -> set[str]:
 
 def _export_estimates(made: MadeResult, request: Export, path: Path) -> Outcome:
     """Write the estimates of a result that has no twin."""
-    from drivetwin.export.parameters.of_twin import collect_estimates
-
     request.refuse_stated({"names", "powertrain"}, "the result has no clutches of a shift")
     estimates = made.estimates
     content = collect_estimates(made.file.parent.name, estimates, [made.describe_origin()])
@@ -99,9 +63,6 @@ def _describe_model(made: ExportedModel, request: Export, path: Path) -> Outcome
 
     C and FMU leave out elements; their error in the shift of the log is stated.
     """
-    from drivetwin._util.atomic import write_text
-    from drivetwin.export.fmu.build import format_inputs
-
     files, document = [path], {"file": str(path)}
     subject, experiment = made.subject, made.experiment
     if request.inputs is not None:
@@ -125,12 +86,9 @@ def _describe_model(made: ExportedModel, request: Export, path: Path) -> Outcome
 
 def _load_model(twin: Twin, request: Export) -> ExportedModel:
     """Load the model, and the initial state from the shift of the log if one is given."""
-    from drivetwin.export.entries import build_subject
-
     gears = None if request.shift is None else parse_gears(request.shift)
     if request.log is None:
         return ExportedModel(build_subject(twin, gears), None)
-    from drivetwin.export.fmu.build import build_measured_subject
 
     recording, _ = read_twin_log(twin, request.log, channels=request.channels)
     found = build_measured_subject(twin, recording, gears, as_logged=request.as_logged)

@@ -10,30 +10,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
 
-import typer
+from rich.console import Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
 
-from drivetwin._util.request import (
-    MEBIBYTE,
-    PAGE,
-    REQUIRED,
-    SECOND,
-    Request,
-    argument,
-    flag,
-    option,
-    output_file,
-    output_folder,
-)
 from drivetwin._util.text import escape_json
-from drivetwin.cli.command_group import CommandGroup
-from drivetwin.cli.options import strict_flag
-from drivetwin.cli.output import NOT_CONFIRMED, make_console, print_blocks, print_line, show_step
+from drivetwin.cli.output import make_console, print_line, show_step
+from drivetwin.cli.requests.desk import EstimateFleet, QueryFleet, ReportFleet, RunFleet
 from drivetwin.errors import INTERRUPTED, InputError
+from drivetwin.fleet.coordinator import FleetRun, run_fleet
+from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
 from drivetwin.fleet.options import FleetOptions
+from drivetwin.fleet.query import query_store, save_answer
+from drivetwin.fleet.report import PAGE as REPORT
+from drivetwin.fleet.report import build_estimate_blocks, save_fleet_report
+from drivetwin.fleet.rules import Sources, read_rules
+from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import (
     Event,
+    Limits,
     Listener,
     Noted,
     Retried,
@@ -44,12 +42,6 @@ from drivetwin.fleet.task import (
     to_document,
 )
 from drivetwin.report.blocks import Outcome, Tone, VerdictBlock, make_notes, make_table
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
-    from drivetwin.fleet.task import Summary
-
 
 _REFRESH = 0.25
 """Time [s] between two pictures of the live view."""
@@ -125,7 +117,6 @@ def show_progress(*, as_json: bool) -> Iterator[Listener]:
     if not shown.is_terminal:
         yield _Lines(tally).handle
         return
-    from rich.live import Live
 
     with Live(
         get_renderable=lambda: _render_tally(tally), console=shown, transient=True,
@@ -160,11 +151,6 @@ class _Lines:
 
 def _render_tally(tally: Tally) -> RenderableType:
     """Render the live view: bar, rate and time left, failures by reason, messages."""
-    from rich.console import Group
-    from rich.progress_bar import ProgressBar
-    from rich.table import Table
-    from rich.text import Text
-
     head = Table.grid(padding=(0, 2))
     rate = tally.compute_rate()
     left = _format_span((tally.files - tally.settled) / rate) if rate > 0.0 else "–"
@@ -187,41 +173,8 @@ def _render_tally(tally: Tally) -> RenderableType:
     return Group(*parts)
 
 
-RUN = "run"
-
-
-class FleetFiles(Request):
-    """Logs, rules and store of a fleet run."""
-
-    logs: tuple[str, ...] = argument("Files, folders and quoted globs.", "LOGS...", default=())
-    vehicle: Path = option("Vehicle card, or rules (TOML).", metavar="CARD|RULES", default=REQUIRED)
-    output: Path = output_folder("Folder of the store.", "STORE", REQUIRED)
-    listed: Path | None = option(
-        "CSV with a column 'path', or text with one path per line.", "--list", metavar="FILE"
-    )
-
-
-class RunFleet(FleetOptions, FleetFiles, command="fleet run"):
-    """Arguments of `fleet run`."""
-
-    as_json: bool = flag("Print one JSON event per line on stdout.", "--json")
-    strict: bool = strict_flag("every log is identified")
-
-
-class StoreInput(Request):
-    """The store of a fleet."""
-
-    store: Path = argument("Folder of 'fleet -o'.", "STORE")
-
-
-def run(request: RunFleet) -> None:
-    """Identify all logs that are not yet in the store.
-
-    The same command continues an interrupted run; finished logs are not computed again.
-    """
-    from drivetwin.fleet.coordinator import FleetRun, run_fleet
-    from drivetwin.fleet.rules import Sources, read_rules
-
+def run(request: RunFleet) -> Outcome:
+    """Run the fleet, and show its progress."""
     if not request.logs and request.listed is None:
         raise InputError("no logs are named", "give files, folders, a quoted glob or --list FILE")
     wanted = FleetRun(
@@ -231,13 +184,7 @@ def run(request: RunFleet) -> None:
         store=request.output,
     )
     with show_progress(as_json=request.as_json) as tell:
-        summary = run_fleet(wanted, tell)
-    if not request.as_json:
-        _print_summary(summary, request.output)
-    if not summary.complete:
-        raise typer.Exit(INTERRUPTED)
-    if request.strict and summary.failures:
-        raise typer.Exit(NOT_CONFIRMED)
+        return _build_outcome(run_fleet(wanted, tell), request)
 
 
 def _explain(summary: Summary, output: Path) -> VerdictBlock:
@@ -256,7 +203,11 @@ def _explain(summary: Summary, output: Path) -> VerdictBlock:
     return VerdictBlock(status, reason, action, tone, "Fleet")
 
 
-def _print_summary(summary: Summary, output: Path) -> None:
+def _build_outcome(summary: Summary, request: RunFleet) -> Outcome:
+    """Build the outcome of a run; as JSON its last event has all of it."""
+    output, exit_code = request.output, 0 if summary.complete else INTERRUPTED
+    if request.as_json:
+        return Outcome(is_confirmed=not summary.failures, exit_code=exit_code)
     rows = {
         "identified": summary.done,
         "bad": summary.bad,
@@ -266,46 +217,28 @@ def _print_summary(summary: Summary, output: Path) -> None:
     }
     counts = make_table(f"Fleet in {output}", ("logs", ("count", "d")), rows.items())
     failures = (f"{n} {name}" for name, n in summary.failures.items())
-    print_blocks([_explain(summary, output), counts, *make_notes("Failures", failures)])
-    if summary.complete and summary.failures:
-        print_line(f"reasons: drivetwin fleet query {output} \"SELECT path, what FROM files "
-            "JOIN logs USING (log) WHERE error <> ''\"")  # fmt: skip
-
-
-class ReportFleet(StoreInput, command="fleet report"):
-    """Arguments of `fleet report`."""
-
-    output: Path | None = output_file(
-        "Page to write; default: report.html in the store.", "FILE.html", PAGE
+    query = (
+        f'reasons: drivetwin fleet query {output} "SELECT path, what FROM files JOIN logs USING '
+        "(log) WHERE error <> ''\""
+    )
+    return Outcome(
+        [_explain(summary, output), counts, *make_notes("Failures", failures)],
+        is_confirmed=not summary.failures,
+        lines=[query] if summary.complete and summary.failures else [],
+        exit_code=exit_code,
     )
 
 
 def report(request: ReportFleet) -> Outcome:
-    """Write the report of a store: shared values, ageing, units, outliers, failures."""
-    from drivetwin.fleet.report import PAGE as REPORT
-    from drivetwin.fleet.report import save_fleet_report
-    from drivetwin.fleet.store import Store
-
+    """Write the page of a store."""
     page = request.store / REPORT if request.output is None else request.output
     with show_step("estimating over the fleet"), Store(request.store) as opened:
         save_fleet_report(opened, page)
     return Outcome(document={"report": page}, files=[page])
 
 
-class EstimateFleet(StoreInput, command="fleet estimate"):
-    """Arguments of `fleet estimate`."""
-
-    parameter: tuple[str, ...] = option(
-        "Parameter to estimate; repeatable; default: all.", metavar="ID", default=()
-    )
-
-
 def estimate(request: EstimateFleet) -> Outcome:
-    """Estimate over all logs: shared values, spread over units, ageing, outliers."""
-    from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
-    from drivetwin.fleet.report import build_estimate_blocks
-    from drivetwin.fleet.store import Store
-
+    """Estimate over the logs of a store."""
     with show_step("estimating over the fleet"), Store(request.store) as opened:
         found = estimate_fleet(opened, request.parameter)
         missing = list_missing_estimates(opened, found, request.parameter)
@@ -314,30 +247,8 @@ def estimate(request: EstimateFleet) -> Outcome:
     return Outcome(blocks, {"estimates": listed, "missing": missing})
 
 
-class QueryFleet(StoreInput, command="fleet query"):
-    """Arguments of `fleet query`."""
-
-    sql: str = argument("SELECT over parameters, files, …", "SQL")
-    output: Path | None = output_file(
-        "Write the answer as .csv or .parquet.",
-        "FILE",
-        {".csv": "text table", ".parquet": "binary table"},
-    )
-    time_limit: float = option("Time limit of the query.", unit=SECOND, minimum=0.1, default=60.0)
-    memory_limit: int = option(
-        "Memory limit of the query.", unit=MEBIBYTE, minimum=64, default=2 * 2**30
-    )
-
-
 def query(request: QueryFleet) -> Outcome:
-    """Query a store in SQL (DuckDB).
-
-    Tables: parameters, frictions, fits, qualities, warnings, rows, files, logs, shifts, settings.
-    """
-    from drivetwin.fleet.query import query_store, save_answer
-    from drivetwin.fleet.store import Store
-    from drivetwin.fleet.task import Limits
-
+    """Answer a question in SQL, on the terminal or as a file."""
     output, limits = request.output, Limits(request.time_limit, request.memory_limit)
     with show_step("asking"), Store(request.store) as opened:
         answer = query_store(opened, request.sql, limits)
@@ -361,20 +272,3 @@ def _format_cell(value: object) -> str:
     if value is None:
         return ""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-class LogsOrCommand(CommandGroup):
-    """`drivetwin fleet LOGS` is `drivetwin fleet run LOGS`: what is no command is a log."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put in the command that is meant."""
-        if args and args[0] not in (*self.commands, "--help"):
-            args = [RUN, *args]
-        return super().parse_args(ctx, args)
-
-
-fleet = LogsOrCommand(
-    name="fleet",
-    entries={RUN: run, "report": report, "estimate": estimate, "query": query},
-    help="Identify many logs into a store; report, estimate and query it. Runs can be resumed.",
-)

@@ -4,38 +4,48 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from drivetwin._util.request import REQUIRED, Request, argument, option, output_file, output_folder
-from drivetwin.cli.options import GEARBOX_HELP
-from drivetwin.cli.output import show_step
+from drivetwin._util.atomic import write_text
+from drivetwin.cli.output import show_step, write_texts
+from drivetwin.cli.requests.desk import Course, Drive, Reduce, ShowGearbox
+from drivetwin.drive import (
+    DriveRun,
+    load_powertrain,
+    plan_all_shift_kinds,
+    plan_launch,
+    run,
+    select_powertrain,
+)
 from drivetwin.errors import InputError
+from drivetwin.export.modelica.model import format_package
+from drivetwin.gearbox import (
+    Gearbox,
+    build_network_elements,
+    describe_ratio_differences,
+    list_builtin_gearboxes,
+    load_gearbox,
+    solve_gear,
+)
+from drivetwin.gearbox import reduce as reduce_shift
 from drivetwin.report.blocks import Block, Outcome, Page, TextBlock, Tone, make_notes
-
-if TYPE_CHECKING:
-    from drivetwin.drive import DriveRun
-    from drivetwin.gearbox import Gearbox
-
-
-class Reduce(Request, command="reduce"):
-    """Arguments of `reduce`."""
-
-    card: str = argument(GEARBOX_HELP, "CARD")
-    shift: str = option("The two gears, such as 2-3.", metavar="OLD-NEW", default=REQUIRED)
+from drivetwin.report.drive import (
+    build_drive_page,
+    build_energy_table,
+    build_shift_table,
+    format_traces,
+)
+from drivetwin.report.gearbox import (
+    build_gear_blocks,
+    build_ratio_table,
+    build_reduction_blocks,
+    evaluate_reduction,
+)
 
 
 def reduce(request: Reduce) -> Outcome:
-    """Reduce a shift to the dual-clutch form and compute the error of the reduction.
-
-    Print the ratios of both elements, the mass matrix, and condition (1) with the members that
-    violate it. Simulate a reference shift and print the error of neglecting their coupling.
-    """
-    from drivetwin.gearbox import describe_ratio_differences, load_gearbox
-    from drivetwin.gearbox import reduce as reduce_shift
-    from drivetwin.report.gearbox import build_reduction_blocks, evaluate_reduction
-
+    """Reduce a shift, and simulate the error of the reduction."""
     shift = request.shift
     old, dash, new = shift.rpartition("-")
     if not dash or not old or not new:
@@ -69,30 +79,8 @@ def reduce(request: Reduce) -> Outcome:
     return Outcome(blocks, document)
 
 
-class ShowGearbox(Request, command="gearbox"):
-    """Arguments of `gearbox`."""
-
-    card: str | None = argument(GEARBOX_HELP, "CARD", default=None)
-    gear: str | None = option("Show one gear in full.", metavar="GEAR")
-    output: Path | None = output_file(
-        "Write the gearbox as a Modelica package.", "FILE.mo", {".mo": "Modelica package"}
-    )
-
-
 def gearbox(request: ShowGearbox) -> Outcome:
-    """List the gears of a gearbox with computed and published ratio.
-
-    Without CARD, list the built-in gearboxes. With --gear, print the speed of every member per
-    input speed, the torque of every element on every member per input torque, and the power flow.
-    """
-    from drivetwin.gearbox import (
-        describe_ratio_differences,
-        list_builtin_gearboxes,
-        load_gearbox,
-        solve_gear,
-    )
-    from drivetwin.report.gearbox import build_gear_blocks, build_ratio_table
-
+    """List the built-in gearboxes, the gears of one, or one gear in full."""
     if request.card is None:
         names = list_builtin_gearboxes()
         return Outcome(document={"builtin": list(names)}, lines=names)
@@ -115,9 +103,6 @@ def gearbox(request: ShowGearbox) -> Outcome:
 
 
 def _write_modelica(box: Gearbox, path: Path) -> None:
-    from drivetwin._util.atomic import write_text
-    from drivetwin.export.modelica.model import format_package
-    from drivetwin.gearbox import build_network_elements
 
     ends = (box.input, box.output)
     write_text(
@@ -128,45 +113,8 @@ def _write_modelica(box: Gearbox, path: Path) -> None:
 FIGURE, TRACES = "drive.html", "drive.csv"
 
 
-class Course(StrEnum):
-    """Built-in plans of a drive."""
-
-    LAUNCH = "launch"
-    ALL_KINDS = "all_kinds"
-
-
-class Drive(Request, command="drive"):
-    """Arguments of `drive`."""
-
-    card: str = argument(GEARBOX_HELP, "CARD", default="three-set-4000cr")
-    course: Course = option(
-        "launch: standstill to the highest gear under power; all_kinds: the same, then kick-down, "
-        "up-shift with closed pedal, coast-down to first gear.",
-        default=Course.ALL_KINDS,
-    )
-    powertrain: str | None = option(
-        "Powertrain file (TOML), or name of a built-in one.", metavar="FILE"
-    )
-    output: Path | None = output_folder(f"Folder for {FIGURE} and {TRACES}.")
-
-
 def drive(request: Drive) -> Outcome:
-    """Simulate a drive from standstill with converter, lock-up and all kinds of shift.
-
-    Print a table of all shifts: start, duration of slip at the input, friction work and peak power
-    of the off-going and the on-coming element, lowest and highest torque of the output shaft. Print
-    the energy balance.
-    """
-    from drivetwin.drive import (
-        load_powertrain,
-        plan_all_shift_kinds,
-        plan_launch,
-        run,
-        select_powertrain,
-    )
-    from drivetwin.gearbox import load_gearbox
-    from drivetwin.report.drive import build_energy_table, build_shift_table
-
+    """Simulate the drive, and write figure and traces."""
     box = load_gearbox(request.card)
     chosen = load_powertrain(request.powertrain or select_powertrain(box))
     plans = {Course.LAUNCH: plan_launch, Course.ALL_KINDS: plan_all_shift_kinds}
@@ -185,9 +133,6 @@ def drive(request: Drive) -> Outcome:
 
 def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
     """Write figure and traces, both or none."""
-    from drivetwin.cli.output import write_texts
-    from drivetwin.report.drive import build_drive_page, format_traces
-
     texts: dict[str, str | Page] = {
         FIGURE: build_drive_page(motion, title),
         TRACES: format_traces(motion),

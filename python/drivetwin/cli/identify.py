@@ -7,23 +7,16 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from drivetwin._util.progress import TimedStages, scale_progress
-from drivetwin._util.request import FileRole, Request, flag, input_file, option, output_folder
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.cli.input_files import find_mapping
 from drivetwin.cli.options import (
     BUS_RESULT,
     REPORT,
     RESULT,
     TCU_RESULT,
     TWIN,
-    CardInput,
-    find_mapping,
-    logs_argument,
-    mapping_option,
-    method_option,
-    quick_option,
-    strict_flag,
 )
 from drivetwin.cli.output import (
     refuse_same_names,
@@ -32,82 +25,37 @@ from drivetwin.cli.output import (
     write_atomically,
     write_texts,
 )
+from drivetwin.cli.requests.identification import Identify, IdentifyOptions
 from drivetwin.errors import DrivetwinError, InputError, Where
+from drivetwin.estimation.analysis.experiment_design import rank_for_weak
+from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.result.method import Method
+from drivetwin.files.bus_file import build_tcu_file, save_tcu_twin
+from drivetwin.files.result_file import ResultFile, save_result
+from drivetwin.files.twin_file import save_twin
+from drivetwin.findings import Finding
+from drivetwin.logs.read import read_log
+from drivetwin.plausibility.check import check_card
 from drivetwin.report.blocks import Outcome, Page, Tone
+from drivetwin.report.bus import build_tcu_blocks, build_tcu_page, identify_vehicle
+from drivetwin.report.html import build_joint_page, save_page, save_report
+from drivetwin.report.notebook import build_identification_blocks
+from drivetwin.shifts.detect import FoundShifts, detect_shifts, refuse_without_shifts
+from drivetwin.tcu.card import is_controller_card, load_controller_card
+from drivetwin.tcu.outcome import TcuIdentification, identify_controller
+from drivetwin.twin.build import build_shift_twin
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.validated_model import (
+    JointIdentification,
+    Source,
+    identify_together,
+    identify_validated,
+)
+from drivetwin.vehicle.card import VehicleCard, is_ratio_card, load_card, load_ratio_card
 from drivetwin.vehicle.effects import parse_priors
 
-if TYPE_CHECKING:
-    from drivetwin.channels.shiftlog import ShiftLog
-    from drivetwin.estimation.identification import Identification
-    from drivetwin.findings import Finding
-    from drivetwin.shifts.detect import FoundShifts
-    from drivetwin.tcu.outcome import TcuIdentification
-    from drivetwin.twin.twin import Twin
-    from drivetwin.validation.validated_model import JointIdentification
-    from drivetwin.vehicle.card import VehicleCard
-
-
 _READING = TimedStages("reading", ("log", "shifts", "card"))
-
-
-def effects_option() -> Any:
-    """Declare the priors of effects."""
-    return option(
-        "Prior of an effect that the model omits, such as tyre_slip=0.002; 0: no effect.",
-        "--effect",
-        metavar="NAME=STD",
-        default=(),
-    )
-
-
-class IdentifyOptions(CardInput):
-    """Card, channel mapping and method of an identification, and priors of effects as typed."""
-
-    method: Method = method_option()
-    quick: bool = quick_option()
-    effects: tuple[str, ...] = effects_option()
-
-    def load_card(self) -> VehicleCard:
-        """Read the card with the priors of effects."""
-        from drivetwin.vehicle.card import load_card
-
-        card = load_card(self.vehicle)
-        return replace(card, effects={**card.effects, **parse_priors(self.effects)})
-
-
-class Identify(Request, command="identify"):
-    """Arguments of `identify`."""
-
-    logs: tuple[Path, ...] = logs_argument("One or more shift logs.")
-    vehicle: Path | None = input_file(
-        "Vehicle card, or a card of the ratios alone (TOML); without one, the ratios are taken "
-        "from the speeds of a bus log.",
-        "CARD",
-        FileRole.CARD,
-    )
-    channels: Path | None = mapping_option()
-    method: Method = method_option()
-    quick: bool = quick_option()
-    effects: tuple[str, ...] = effects_option()
-    output: Path | None = output_folder("Folder for result, twin and report.")
-    together: bool = flag("Fit all logs of one vehicle jointly.")
-    hold_out: tuple[str, ...] = option(
-        "Shift to predict instead of fit: its number, a LOG, or LOG:NUMBER; repeatable.",
-        metavar="SHIFT",
-        default=(),
-    )
-    bus: bool = flag("Use speeds, gear and engine torque alone, also with a whole vehicle card.")
-    strict: bool = strict_flag(
-        "every model is valid, limits included; of bus logs, unless the shifts agree and identify "
-        "a quantity"
-    )
-
-    @property
-    def options(self) -> IdentifyOptions:
-        """The options of the identification of a whole vehicle card."""
-        return IdentifyOptions(**self.select(IdentifyOptions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +68,12 @@ class IdentifiedLog:
     twin: Twin
 
 
+def load_identified_card(how: IdentifyOptions) -> VehicleCard:
+    """Read the card of an identification with the priors of effects."""
+    card = load_card(how.vehicle)
+    return replace(card, effects={**card.effects, **parse_priors(how.effects)})
+
+
 def read_shifts(
     path: Path, how: IdentifyOptions, card: VehicleCard
 ) -> tuple[ShiftLog, FoundShifts, tuple[Finding, ...]]:
@@ -127,10 +81,6 @@ def read_shifts(
 
     Raises the typed errors of the readers and of the detection.
     """
-    from drivetwin.logs.read import read_log
-    from drivetwin.plausibility.check import check_card
-    from drivetwin.shifts.detect import detect_shifts
-
     with _READING.enter("log"):
         log = read_log(path, card, find_mapping(how.channels, path))
     with _READING.enter("shifts", "looking for shifts"):
@@ -144,12 +94,8 @@ def run_identification(log: Path, how: IdentifyOptions) -> IdentifiedLog:
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
-    from drivetwin.estimation.result.method import Method
-    from drivetwin.shifts.detect import refuse_without_shifts
-    from drivetwin.validation.validated_model import identify_validated
-
     with show_step(f"reading {log.name}"):
-        card = how.load_card()
+        card = load_identified_card(how)
         recording, shifts, doubts = read_shifts(log, how, card)
     show_findings(doubts)
     refuse_without_shifts(recording, card, shifts)
@@ -157,8 +103,6 @@ def run_identification(log: Path, how: IdentifyOptions) -> IdentifiedLog:
         model = identify_validated(recording, card, shifts, how.method)
     found = model.result
     if found.method is Method.LIKELIHOOD:
-        from drivetwin.estimation.analysis.experiment_design import rank_for_weak
-
         with show_step("comparing experiments"):
             found = rank_for_weak(found)
     return IdentifiedLog(recording, card, found, model.twin)
@@ -172,19 +116,12 @@ def identify_log(log: Path, how: IdentifyOptions, folder: Path | None) -> Outcom
 
 def build_outcome(found: Identification, files: Sequence[Path]) -> Outcome:
     """Build the outcome of an identification with the files that were written."""
-    from drivetwin.files.result_file import ResultFile
-    from drivetwin.report.notebook import build_identification_blocks
-
     document = ResultFile.from_result(found).to_document()
     return Outcome(build_identification_blocks(found), document, files, found.status.is_confirmed)
 
 
 def write_outcome(outcome: IdentifiedLog, folder: Path) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; returns their paths."""
-    from drivetwin.files.result_file import save_result
-    from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.html import save_report
-
     with show_step("writing the report"), write_atomically(folder) as beside:
         save_result(beside / RESULT, outcome.found)
         save_twin(beside / TWIN, outcome.twin)
@@ -197,11 +134,6 @@ def identify_controller_logs(request: Identify, vehicle: Path) -> Outcome:
 
     Raises InputError for options of other logs, and the typed errors of reader and fit.
     """
-    from drivetwin.files.bus_file import build_tcu_file
-    from drivetwin.report.bus import build_tcu_blocks
-    from drivetwin.tcu.card import load_controller_card
-    from drivetwin.tcu.outcome import identify_controller
-
     unused = ("bus", "quick", "effects")
     request.refuse_stated(unused, "the log of a gearbox control has one method")
     card, held = load_controller_card(vehicle), _read_numbers(request.hold_out)
@@ -229,13 +161,6 @@ def _read_numbers(wanted: Sequence[str]) -> list[int] | None:
 
 def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, ...]:
     """Write result, twin and report into `folder`, all or none; return their paths."""
-    from drivetwin.cli.output import write_atomically
-    from drivetwin.files.bus_file import save_tcu_twin
-    from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.bus import build_tcu_page
-    from drivetwin.report.html import save_page
-    from drivetwin.twin.build import build_shift_twin
-
     kinds = found.twin.kinds if found.status.is_confirmed else ()
     twins = {f"shift_{kind}.toml": build_shift_twin(found.found, kind) for kind in kinds}
     with write_atomically(folder) as beside:
@@ -248,27 +173,7 @@ def _write(found: TcuIdentification, folder: Path, result: str) -> tuple[Path, .
 
 
 def identify(request: Identify) -> Iterator[Outcome]:
-    """Identify the driveline from shift logs.
-
-    With -o, write DIR/result.json, DIR/twin.toml and DIR/report.html. Several logs are identified
-    one by one, each into DIR/NAME-OF-LOG. If a log cannot be identified, it is reported and the
-    exit code is 2; the other logs get their results.
-
-    With --together, one driveline is fitted to all logs; load and engine-torque delay are specific
-    to each log. With --hold-out, which implies --together, a log or shift takes no part in the fit.
-    It is simulated with the parameters of the others and compared.
-
-    Bus logs without pressures and output torque need a card of the ratios alone, or none: all logs
-    are then of one vehicle and identified as one, into DIR/bus.json and DIR/report.html. With
-    --hold-out, the decays of a LOG are predicted by the others.
-
-    Logs of a gearbox control (commanded pressures, engine torque of the bus) need a card with
-    converter and [[changes]]; see 'drivetwin schema tcu-card'. All shifts of all logs are fitted as
-    one, into DIR/tcu.json, DIR/twin.toml and DIR/report.html; every fifth is held out, unless
-    --hold-out names others.
-    """
-    from drivetwin.tcu.card import is_controller_card
-
+    """Identify logs one by one or jointly, or all logs of a bus or of a gearbox control."""
     if request.vehicle is not None and is_controller_card(request.vehicle):
         yield identify_controller_logs(request, request.vehicle)
         return
@@ -292,8 +197,6 @@ def identify(request: Identify) -> Iterator[Outcome]:
 
 def _is_bus(request: Identify) -> bool:
     """Return True if speeds, gear and engine torque alone are to be used."""
-    from drivetwin.vehicle.card import is_ratio_card
-
     return request.bus or request.vehicle is None or is_ratio_card(request.vehicle)
 
 
@@ -312,9 +215,6 @@ def identify_bus_logs(request: Identify) -> Outcome:
 
     Raises the typed errors of the readers, and InputError for what needs a whole vehicle card.
     """
-    from drivetwin.report.bus import identify_vehicle
-    from drivetwin.vehicle.card import load_ratio_card
-
     logs, vehicle = request.logs, request.vehicle
     refuse_same_names(logs, "rename one of them")
     held = _find_held(request.hold_out, logs)
@@ -333,8 +233,6 @@ def identify_bus_logs(request: Identify) -> Outcome:
 
 def _read(path: Path, channels: Path | None, vehicle: Path | None) -> ShiftLog:
     """Read a log without a vehicle card; one with an output torque needs a card."""
-    from drivetwin.logs.read import read_log
-
     log = read_log(path, None, find_mapping(channels, path))
     if "output_torque" in log and vehicle is None:
         raise InputError(
@@ -372,12 +270,8 @@ def identify_jointly(
 
     Raises the typed errors of each stage.
     """
-    from drivetwin.estimation.analysis.experiment_design import rank_for_weak
-    from drivetwin.shifts.detect import refuse_without_shifts
-    from drivetwin.validation.validated_model import Source, identify_together
-
     refuse_same_names(logs, "rename one of them")
-    card = how.load_card()
+    card = load_identified_card(how)
     with show_step(f"reading {len(logs)} logs"):
         reads = []
         for number, path in enumerate(logs):
@@ -404,10 +298,6 @@ def _write_joint(made: JointIdentification, folder: Path) -> tuple[Path, ...]:
 
     `twin.toml` is that of the first log; of several each has `NAME-OF-LOG.twin.toml` besides.
     """
-    from drivetwin.files.result_file import save_result
-    from drivetwin.files.twin_file import save_twin
-    from drivetwin.report.html import build_joint_page, save_page
-
     twins = list(made.twins.items())
     named = {TWIN: twins[0][1]}
     if len(twins) > 1:

@@ -7,52 +7,38 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from drivetwin._util.request import Output, Request, flag, input_file, option
-from drivetwin.cli.options import find_mapping, log_argument, mapping_option
+from drivetwin._util.atomic import write_text
+from drivetwin.authoring.log_survey import find_pressure_columns, name_pressures
+from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.mapping_file import Draft, format_mapping, read_mapping
+from drivetwin.channels.roles import FOR_SHIFTS, ReadOptions, TimeColumn
+from drivetwin.cli.input_files import find_mapping
 from drivetwin.cli.output import print_line, show_step, to_error_document
+from drivetwin.cli.requests.identification import Inspect
 from drivetwin.errors import DrivetwinError, UnitError
+from drivetwin.files.records import dump_findings
 from drivetwin.findings import Finding
-from drivetwin.report.blocks import Block, Outcome, TextBlock, make_notes
+from drivetwin.logs.formats.can.database import list_databases
+from drivetwin.logs.formats.detect import name_project_mapping, open_stated
+from drivetwin.logs.raw import Recording, Remembered
+from drivetwin.logs.read import Demands, assemble_log
+from drivetwin.logs.survey import (
+    Column,
+    Survey,
+    draft_mapping,
+    draft_unread,
+    find_shortest_step,
+    survey_recording,
+)
+from drivetwin.plausibility.check import drop_card_findings
+from drivetwin.report.blocks import Block, Outcome, TextBlock, build_findings_section, make_notes
 from drivetwin.report.sections.inputs import build_column_table
-
-if TYPE_CHECKING:
-    from drivetwin.channels.mapping import Mapped
-    from drivetwin.channels.mapping_file import Draft
-    from drivetwin.logs.raw import Recording
-    from drivetwin.logs.survey import Column, Survey
-    from drivetwin.vehicle.card import VehicleCard
-
-
-class Inspect(Request, command="inspect"):
-    """Arguments of `inspect`."""
-
-    log: Path = log_argument()
-    vehicle: Path | None = input_file("Vehicle card; its elements name the pressures.", "CARD")
-    channels: Path | None = mapping_option()
-    write_mapping: Path | None = option(
-        "Write the channel mapping as a file to edit; open points are comments.",
-        metavar="MAP",
-        output=Output(),
-    )
-    accept_proposals: bool = flag(
-        "With --write-mapping: enter units that are the only proposal.", needs=("write_mapping",)
-    )
+from drivetwin.vehicle.card import VehicleCard, is_ratio_card, load_card
 
 
 def inspect(request: Inspect) -> Outcome:
-    """List the columns of a log with unit, rate, range, gaps and proposed role.
-
-    Also list the warnings of shifts and identify, and their reason if they refuse the log.
-    """
-    from drivetwin._util.atomic import write_text
-    from drivetwin.channels.mapping_file import format_mapping, read_mapping
-    from drivetwin.files.records import dump_findings
-    from drivetwin.logs.formats.can.database import list_databases
-    from drivetwin.logs.survey import draft_mapping
-    from drivetwin.vehicle.card import is_ratio_card, load_card
-
+    """Survey a log, read it as the other commands do, and write the mapping."""
     log, write_mapping, accept = request.log, request.write_mapping, request.accept_proposals
     vehicle = request.vehicle
     # A card of the ratios alone names no pressures.
@@ -82,8 +68,6 @@ def inspect(request: Inspect) -> Outcome:
 
 def _build_seen(seen: _Seen, draft: Draft, name: str) -> Iterator[Block]:
     """Build the columns of a log, notes, open units with their proposals, and findings."""
-    from drivetwin.report.blocks import build_findings_section
-
     found = seen.survey
     shown = _select_shown(found.columns)
     yield build_column_table(shown, f"Columns of {name}")
@@ -126,13 +110,6 @@ class _Seen:
 
 def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds."""
-    from drivetwin.channels.mapping import Mapped
-    from drivetwin.channels.roles import ReadOptions, TimeColumn
-    from drivetwin.logs.formats.detect import open_stated
-    from drivetwin.logs.raw import Remembered
-    from drivetwin.logs.survey import find_shortest_step
-    from drivetwin.plausibility.check import drop_card_findings
-
     try:
         with open_stated(log, stated) as (opened, used):
             recording = Remembered(opened)
@@ -166,9 +143,6 @@ def _survey(
 
     Without a card pressures are named after their columns.
     """
-    from drivetwin.authoring.log_survey import find_pressure_columns, name_pressures
-    from drivetwin.logs.survey import survey_recording
-
     names = card
     specs = {}
     if card is None:
@@ -193,10 +167,6 @@ def _write_unread(
     databases: Sequence[str],
 ) -> None:
     """Write a mapping with what is stated and stubs of all roles, for a log that cannot be read."""
-    from drivetwin._util.atomic import write_text
-    from drivetwin.channels.mapping_file import format_mapping
-    from drivetwin.logs.survey import draft_unread
-
     elements = None if card is None else tuple(card.elements)
     draft = draft_unread(elements, stated.channels, fault.what, databases)
     write_text(path, format_mapping(stated.channels, stated.options, stated.names, draft))
@@ -207,10 +177,6 @@ def _read_as_mapped_log(
     recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped, *, gearing: bool
 ) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
     """Read a log as for use, missing roles allowed; return findings, error and who refuses it."""
-    from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.logs.formats.detect import name_project_mapping
-    from drivetwin.logs.read import Demands, assemble_log
-
     any_role, for_shifts = Demands((), None, gearing), Demands((), FOR_SHIFTS, gearing)
     try:
         with name_project_mapping(stated):

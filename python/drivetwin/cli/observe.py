@@ -6,43 +6,30 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from drivetwin._util.request import LOG_ENDINGS, PAGE, output_file, select_outputs
-from drivetwin.cli.options import TwinLogInput, read_twin_log
-from drivetwin.cli.output import show_step
+import numpy as np
+
+from drivetwin._util.request import LOG_ENDINGS, PAGE, select_outputs
+from drivetwin.cli.input_files import read_twin_log
+from drivetwin.cli.output import show_step, write_atomically
+from drivetwin.cli.requests.use import Observe
 from drivetwin.errors import DamagedChannelError
+from drivetwin.export.parameters.content import to_flat_name
+from drivetwin.files.twin_file import load_twin
+from drivetwin.logs.raw import RawChannel
+from drivetwin.logs.write import write_log
+from drivetwin.observer.linear_model import Observation
+from drivetwin.observer.smooth import estimate_torques
 from drivetwin.report.blocks import Outcome, Tone, make_notes
-
-if TYPE_CHECKING:
-    from drivetwin.logs.raw import RawChannel
-    from drivetwin.observer.linear_model import Observation
-    from drivetwin.shifts.shift import Shift
-
-
-class Observe(TwinLogInput, command="observe"):
-    """Arguments of `observe`."""
-
-    output: tuple[Path, ...] = output_file(
-        "File for the torques: .csv, .parquet, .mf4 or .mat; page with the figures: .html; "
-        "repeatable.",
-        "FILE",
-        LOG_ENDINGS | PAGE,
-        (),
-    )
+from drivetwin.report.html import save_page
+from drivetwin.report.observer import build_observer_page, build_torque_blocks
+from drivetwin.shifts.detect import require_shifts
+from drivetwin.shifts.shift import Shift, compute_exclusive_masks
 
 
 def observe(request: Observe) -> Outcome:
-    """Estimate torques of output shaft and clutches in the shifts of a log, with 95 % bands.
-
-    The log needs no output torque; if it has one, it is not used.
-    """
-    from drivetwin.files.twin_file import load_twin
-    from drivetwin.observer.smooth import estimate_torques
-    from drivetwin.report.html import save_page
-    from drivetwin.report.observer import build_observer_page, build_torque_blocks
-    from drivetwin.shifts.detect import require_shifts
-
+    """Observe the shifts of a log, and write table and page."""
     model = load_twin(request.twin)
     recording, card = read_twin_log(model, request.log, request.vehicle, request.channels)
     shifts = require_shifts(recording, card)
@@ -81,9 +68,6 @@ def _observe_shifts(
 
 
 def _write_observations(path: Path, found: Sequence[Observation]) -> None:
-    from drivetwin.cli.output import write_atomically
-    from drivetwin.export.parameters.content import to_flat_name
-    from drivetwin.logs.write import write_log
 
     channels = collect_channels(found)
     if path.suffix.casefold() == ".mat":
@@ -97,11 +81,6 @@ def collect_channels(found: Sequence[Observation]) -> tuple[RawChannel, ...]:
 
     A gear that is held between two shifts is divided in its middle: time increases throughout.
     """
-    import numpy as np
-
-    from drivetwin.logs.raw import RawChannel
-    from drivetwin.shifts.shift import compute_exclusive_masks
-
     own = compute_exclusive_masks([one.shift for one in found], [one.time for one in found])
     parts: dict[str, list[tuple[Any, Any]]] = {}
     for one, kept in zip(found, own, strict=True):

@@ -217,8 +217,9 @@ def deliver(outcomes: Iterable[Outcome], *, as_json: bool, strict: bool) -> None
         if one.fault is not None:
             show_error(one.fault, as_json=False)
     if as_json or any(one.is_json for one in made):
-        documents = [_build_document(one) for one in made]
-        print_json(documents[0] if len(documents) == 1 else {"results": documents})
+        documents = [one for one in map(_build_document, made) if one]
+        if documents:
+            print_json(documents[0] if len(documents) == 1 else {"results": documents})
     for one in reversed(made):
         if code := one.exit_code if one.fault is None else one.fault.exit_code:
             raise typer.Exit(code)

@@ -5,41 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from drivetwin._util.request import PAGE, Request, argument, output_file
-from drivetwin.cli.options import mapping_option, read_twin_log
+from drivetwin.cli.input_files import read_twin_log
 from drivetwin.cli.output import show_step
+from drivetwin.cli.requests.use import Report
 from drivetwin.errors import InputError, Where
 from drivetwin.report.blocks import Outcome
-
-if TYPE_CHECKING:
-    from drivetwin.report.find_reports import Trial
-    from drivetwin.report.results import MadeResult
-    from drivetwin.twin.twin import Twin
-
-
-class Report(Request, command="report"):
-    """Arguments of `report`."""
-
-    sources: tuple[Path, ...] = argument(
-        "Folders of identify, examine or fit, their results, twin.toml, or logs.", "SOURCE..."
-    )
-    output: Path = output_file(
-        "Page with the comparison.", "FILE.html", PAGE, Path("comparison.html")
-    )
-    channels: Path | None = mapping_option()
+from drivetwin.report.comparison import build_comparison_page, simulate_trials
+from drivetwin.report.find_reports import Trial
+from drivetwin.report.html import save_page
+from drivetwin.report.results import MadeResult, open_result
+from drivetwin.shifts.detect import require_shifts
+from drivetwin.twin.twin import Twin
 
 
 def report(request: Report) -> Outcome:
-    """Print the path of a report, or compare several results.
-
-    For one result of identify, examine or fit, print its verdict and the path of its report. For
-    several, or a twin and logs, write a page that compares parameters, friction, and the simulation
-    of each log by each twin.
-    """
-    from drivetwin.report.results import open_result
-
+    """Find the report of one result, or compare several."""
     sources, output = request.sources, request.output
     made = [source for source in sources if _is_result(source)]
     logs = [source for source in sources if not _is_result(source)]
@@ -78,9 +59,6 @@ def _find_report(made: MadeResult) -> Outcome:
 def _write_comparison(
     made: Sequence[Path], logs: Sequence[Path], channels: Path | None, output: Path
 ) -> None:
-    from drivetwin.report.comparison import build_comparison_page
-    from drivetwin.report.html import save_page
-    from drivetwin.report.results import open_result
 
     with show_step("reading"):
         opened = {name: open_result(source) for name, source in _assign_names(made).items()}
@@ -114,9 +92,6 @@ def _assign_names(made: Sequence[Path]) -> dict[str, Path]:
 
 def _simulate_trials(twins: Mapping[str, Twin], log: Path, channels: Path | None) -> list[Trial]:
     """Every shift of a log by every twin; shifts are found with the ratios of the first."""
-    from drivetwin.report.comparison import simulate_trials
-    from drivetwin.shifts.detect import require_shifts
-
     recording, card = read_twin_log(next(iter(twins.values())), log, None, channels)
     with show_step(f"simulating {log.name}"):
         return simulate_trials(twins, recording, require_shifts(recording, card).shifts, log.name)

@@ -3,24 +3,14 @@
 
 from __future__ import annotations
 
-from drivetwin._util.request import Request, argument, build_request_schema, option
+from drivetwin._util.request import build_request_schema
+from drivetwin.cli.requests.desk import PrintSchema
 from drivetwin.files.schemas import FileKind, build_json_schema
 from drivetwin.report.blocks import Outcome
 
 
-class PrintSchema(Request, command="schema"):
-    """Arguments of `schema`."""
-
-    kind: FileKind | None = argument(
-        "Kind of file; default: list the kinds.", "KIND", default=None, shows_default=False
-    )
-    command: str | None = option(
-        "Print the schema of the arguments of a command, such as calibrate.", metavar="COMMAND"
-    )
-
-
 def schema(request: PrintSchema) -> Outcome:
-    """Print the JSON Schema of a kind of file, for editors; without KIND, list the kinds."""
+    """Build the schema of a file or of a command, or list the kinds of files."""
     if request.command is not None:
         return Outcome(document=build_request_schema(request.command), is_json=True)
     if request.kind is not None:

@@ -6,61 +6,58 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from drivetwin._util.display_units import format_uncertainty
-from drivetwin._util.request import PAGE, FileRole, input_file, output_file
-from drivetwin.cli.options import LogInput, find_mapping
+from drivetwin.bus.identify import find_shifts
+from drivetwin.channels.roles import FOR_SHIFTS
+from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.cli.input_files import find_mapping
 from drivetwin.cli.output import show_step
+from drivetwin.cli.requests.identification import DetectShifts
 from drivetwin.errors import InputError, Where
-from drivetwin.report.blocks import Block, Outcome, TableBlock, TextBlock, make_notes, make_table
-
-if TYPE_CHECKING:
-    from drivetwin.channels.shiftlog import ShiftLog
-    from drivetwin.estimation.direct.inertia_in_gear import HeldGear
-    from drivetwin.estimation.direct.resonance import Resonance
-    from drivetwin.shifts.detect import FoundShifts
-    from drivetwin.shifts.lockup_clutch import LockUp
-    from drivetwin.shifts.shift import Shift
-    from drivetwin.shifts.summary import FigureComparison
-    from drivetwin.vehicle.card import VehicleCard
-
-
-class DetectShifts(LogInput, command="shifts"):
-    """Arguments of `shifts`."""
-
-    against: tuple[Path, ...] = input_file(
-        "Log of another vehicle or software state to compare the shift quality with (may be "
-        "repeated).",
-        "LOG",
-        FileRole.LOG,
-        (),
-    )
-    output: Path | None = output_file(
-        "Page with shift quality by kind of shift.", "FILE.html", PAGE
-    )
+from drivetwin.estimation.data.segments import prepare_gears, prepare_input_speed
+from drivetwin.estimation.direct.inertia_in_gear import HeldGear, estimate_gear_inertias
+from drivetwin.estimation.direct.resonance import Resonance, find_shift_resonance
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.files.bus_file import build_shift_record
+from drivetwin.files.records import dump_findings
+from drivetwin.files.result_file import ShiftRecord
+from drivetwin.logs.read import read_log
+from drivetwin.report.blocks import (
+    Block,
+    Outcome,
+    TableBlock,
+    TextBlock,
+    build_findings_section,
+    make_notes,
+    make_table,
+)
+from drivetwin.report.bus import build_phase_table as build_bus_table
+from drivetwin.report.html import save_page
+from drivetwin.report.sections.summary import build_phase_table
+from drivetwin.report.whole_drive import (
+    build_comparison_table,
+    build_quality_tables,
+    build_summary_tables,
+    build_whole_drive_page,
+)
+from drivetwin.shifts.coverage import find_causes
+from drivetwin.shifts.detect import FoundShifts, detect_shifts, find_gear_spans
+from drivetwin.shifts.lockup_clutch import LockUp, detect_lock_ups
+from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.shifts.summary import (
+    FigureComparison,
+    collect_findings,
+    collect_rejected,
+    compare_drives,
+    summarize_shifts,
+)
+from drivetwin.vehicle.card import VehicleCard, is_ratio_card, load_card, load_ratio_card
 
 
 def shifts(request: DetectShifts) -> Outcome:
-    """Detect the shifts of a log, with phases and shift quality.
-
-    For several shifts, state the distribution of each figure by kind and gears, outliers and trend.
-    For a log without output torque, also estimate the resonance of the driveline after each shift,
-    and the total inertia over η in each gear held, as far as the log determines them.
-
-    With a card of the ratios alone, list the shifts of a bus log and their phases.
-    """
-    from drivetwin.files.records import dump_findings
-    from drivetwin.report.blocks import build_findings_section
-    from drivetwin.report.sections.summary import build_phase_table
-    from drivetwin.report.whole_drive import build_comparison_table
-    from drivetwin.shifts.coverage import find_causes
-    from drivetwin.shifts.detect import find_gear_spans
-    from drivetwin.shifts.lockup_clutch import detect_lock_ups
-    from drivetwin.shifts.shift import make_shift_labels
-    from drivetwin.shifts.summary import compare_drives
-    from drivetwin.vehicle.card import is_ratio_card, load_card
-
+    """Detect the shifts of a log, and describe or compare their quality."""
     if is_ratio_card(request.vehicle):
         return _show_bus_shifts(request)
     card = load_card(request.vehicle)
@@ -95,7 +92,6 @@ def shifts(request: DetectShifts) -> Outcome:
 
 def _show_bus_shifts(request: DetectShifts) -> Outcome:
     """List the shifts of a bus log; raise InputError for options that need shift quality."""
-
     if request.against:
         raise refuse_quality(request.vehicle, "--against")
     if request.output is not None:
@@ -106,9 +102,6 @@ def _show_bus_shifts(request: DetectShifts) -> Outcome:
 def _find_shifts(
     request: DetectShifts, card: VehicleCard, file: Path
 ) -> tuple[ShiftLog, FoundShifts]:
-    from drivetwin.channels.roles import FOR_SHIFTS
-    from drivetwin.logs.read import read_log
-    from drivetwin.shifts.detect import detect_shifts
 
     with show_step(f"reading {file.name}"):
         mapping = find_mapping(request.channels, file)
@@ -120,9 +113,6 @@ def _write_page(
     path: Path, shifts: Sequence[Shift], log: ShiftLog, comparison: Sequence[FigureComparison]
 ) -> None:
     """Write a page with the shift quality of a drive."""
-    from drivetwin.report.html import save_page
-    from drivetwin.report.whole_drive import build_whole_drive_page
-
     with show_step(f"writing {path.name}"):
         save_page(path, build_whole_drive_page(shifts, log, comparison))
 
@@ -137,9 +127,6 @@ class _SpeedResults(NamedTuple):
 def _estimate_from_speeds(
     log: ShiftLog, card: VehicleCard, shifts: Sequence[Shift]
 ) -> _SpeedResults:
-    from drivetwin.estimation.data.segments import prepare_gears, prepare_input_speed
-    from drivetwin.estimation.direct.inertia_in_gear import estimate_gear_inertias
-    from drivetwin.estimation.direct.resonance import find_shift_resonance
 
     if "output_torque" in log:
         return _SpeedResults()
@@ -156,8 +143,6 @@ def _estimate_from_speeds(
 def _describe_shifts(
     found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults
 ) -> dict[str, Any]:
-    from drivetwin.files.result_file import ShiftRecord
-    from drivetwin.shifts.summary import summarize_shifts
 
     return {
         "shifts": [ShiftRecord.from_result(one).model_dump(by_alias=True) for one in found.shifts],
@@ -173,9 +158,6 @@ def _build_details(
     found: FoundShifts, closings: Sequence[LockUp], seen: _SpeedResults
 ) -> Iterator[Block]:
     """Build what stands below the table of the shifts: notes and further tables."""
-    from drivetwin.report.whole_drive import build_quality_tables, build_summary_tables
-    from drivetwin.shifts.summary import summarize_shifts
-
     yield from build_quality_tables(found.shifts)
     if len(found.shifts) > 1:
         yield from build_summary_tables(summarize_shifts(found.shifts)).values()
@@ -209,8 +191,6 @@ def _list_resonances(seen: _SpeedResults) -> Iterator[str]:
 
 def _list_remarks(found: FoundShifts) -> Iterator[str]:
     """Yield each kind of finding and each reason of rejection once, with their number."""
-    from drivetwin.shifts.summary import collect_findings, collect_rejected
-
     for finding, labels in collect_findings(found.shifts):
         names = ", ".join(dict.fromkeys(labels))
         more = f" ({len(labels)} shifts: {names})" if len(labels) > 1 else ""
@@ -231,8 +211,6 @@ def _describe_resonance(swing: Resonance) -> str:
 
 def _format_spread(value: float, std: float) -> str:
     """A value ± the half width of its 95 % interval."""
-    from drivetwin.estimation.result.estimate import Z95
-
     return " ± ".join(filter(None, format_uncertainty(value, Z95 * std)))
 
 
@@ -260,14 +238,6 @@ def show_bus_shifts(log: Path, vehicle: Path, channels: Path | None) -> Outcome:
 
     Raises the typed errors of the readers.
     """
-    from drivetwin.bus.identify import find_shifts
-    from drivetwin.files.bus_file import build_shift_record
-    from drivetwin.files.records import dump_findings
-    from drivetwin.logs.read import read_log
-    from drivetwin.report.blocks import build_findings_section
-    from drivetwin.report.bus import build_phase_table
-    from drivetwin.vehicle.card import load_ratio_card
-
     card = load_ratio_card(vehicle)
     with show_step(f"reading {log.name}"):
         recording = read_log(log, None, find_mapping(channels, log))
@@ -278,7 +248,7 @@ def show_bus_shifts(log: Path, vehicle: Path, channels: Path | None) -> Outcome:
     shifts = [build_shift_record(found.log.label, one).to_document() for one in found.shifts]
     return Outcome(
         [
-            build_phase_table([found]) if found.shifts else none,
+            build_bus_table([found]) if found.shifts else none,
             *build_findings_section(findings).blocks,
         ],
         {"shifts": shifts, "findings": dump_findings(findings)},

@@ -5,68 +5,44 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from drivetwin._util.request import PAGE, flag, input_file, option, output_file, select_outputs
-from drivetwin.cli.options import (
-    MODEL,
-    TCU_RESULT,
-    TWIN,
-    TwinLogInput,
-    read_twin_log,
-    result_argument,
-)
+from drivetwin._util.atomic import write_text
+from drivetwin._util.request import PAGE, select_outputs
+from drivetwin.cli.fit import read_recordings
+from drivetwin.cli.input_files import read_twin_log
+from drivetwin.cli.options import MODEL, TCU_RESULT, TWIN
 from drivetwin.cli.output import print_line, show_step
+from drivetwin.cli.requests.use import Simulate
 from drivetwin.errors import InputError, Where
+from drivetwin.estimation.result.validation import Validation
+from drivetwin.export.entries import Stepping, rerun_fixed_step
+from drivetwin.export.parameters.files import read_parameters, read_template, restore_entries
+from drivetwin.export.parameters.of_twin import collect_parameters
+from drivetwin.export.parameters.to_twin import update_twin
 from drivetwin.export.targets import DEFAULT_STEP, InputKind
-from drivetwin.report.blocks import Block, Outcome
-
-if TYPE_CHECKING:
-    from drivetwin.estimation.result.validation import Validation
-    from drivetwin.report.results import MadeResult
-    from drivetwin.tcu.predict import PredictedShift
-    from drivetwin.twin.twin import Twin
-
-
-class Simulate(TwinLogInput, command="simulate"):
-    """Arguments of `simulate`."""
-
-    twin: Path = result_argument()
-    output: tuple[Path, ...] = output_file(
-        "Measured and simulated signals: .csv as a table side by side (SI), .html as a page with "
-        "plots; repeatable.",
-        "FILE",
-        {".csv": "table"} | PAGE,
-        (),
-    )
-    step: float | None = option(
-        "Step at which the inputs are sampled, as by an importer of the exported FMU.",
-        metavar="SECONDS",
-    )
-    input: InputKind = option(
-        "Inputs between these steps; without --step the step is 1 ms.", default=InputKind.LINEAR
-    )
-    parameters: Path | None = input_file(
-        "Exported and edited parameter file; its values replace those of the twin."
-    )
-    from_command: bool = flag(
-        "Compute pressures from the commands in the log by the actuators of the twin."
-    )
-    template: Path | None = input_file(
-        "Template by which the file of --parameters was exported.", needs=("parameters",)
-    )
+from drivetwin.files.bus_file import is_tcu_twin, load_tcu_twin, record_prediction
+from drivetwin.files.records import dump_findings
+from drivetwin.fit.fit import predict_recording
+from drivetwin.fit.model_file import read_model
+from drivetwin.report.blocks import Block, Outcome, Tone, build_findings_section, make_notes
+from drivetwin.report.bus import build_prediction_table, build_predictions_page
+from drivetwin.report.comparison import build_comparison_page, make_trial_label
+from drivetwin.report.find_reports import Candidate, Trial
+from drivetwin.report.fit import build_prediction_blocks, build_prediction_page
+from drivetwin.report.html import save_page
+from drivetwin.report.results import MadeResult, open_result
+from drivetwin.report.sections.summary import build_fit_table
+from drivetwin.shifts.detect import require_shifts
+from drivetwin.tcu.log import read_controller_log
+from drivetwin.tcu.outcome import list_unfitted_kinds, predict
+from drivetwin.tcu.predict import PredictedShift
+from drivetwin.twin.twin import Twin
+from drivetwin.validation.initial_state import replace_pressures
+from drivetwin.validation.simulate_log import format_signals, simulate_shift
 
 
 def simulate(request: Simulate) -> Outcome:
-    """Simulate the shifts of a log with an identified model and compare.
-
-    The inputs are the measured engine torque and pressures. The log can differ from the log of the
-    identification. Ratios and shift elements are those of the twin; a vehicle card is not needed.
-    The result of a fit simulates the recording as a whole by its model.toml.
-    The twin of a gearbox control's log predicts shifts from commands and bus torque, with bands.
-    """
-    from drivetwin.report.results import open_result
-
+    """Simulate a log by a twin, a fitted model or the plant of a gearbox control."""
     if (twin := _find_controller_twin(request.twin)) is not None:
         return _simulate_controller(twin, request)
     made = open_result(request.twin)
@@ -75,15 +51,6 @@ def simulate(request: Simulate) -> Outcome:
 
 def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
     """Simulate every shift of a log by a twin, and write tables and pages."""
-    from drivetwin._util.atomic import write_text
-    from drivetwin.export.entries import Stepping, rerun_fixed_step
-    from drivetwin.files.records import dump_findings
-    from drivetwin.report.blocks import build_findings_section
-    from drivetwin.report.sections.summary import build_fit_table
-    from drivetwin.shifts.detect import require_shifts
-    from drivetwin.validation.initial_state import replace_pressures
-    from drivetwin.validation.simulate_log import format_signals, simulate_shift
-
     model, log = made.load_twin(), request.log
     if request.parameters is not None:
         model = _apply_parameters(model, request.parameters, request.template)
@@ -123,8 +90,6 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
 def _find_controller_twin(source: Path) -> Path | None:
     """Return the twin of a gearbox control's log by its folder, its file or the result beside it;
     None for another result."""
-    from drivetwin.files.bus_file import is_tcu_twin
-
     files = (source / TWIN,) if source.is_dir() else (source, source.with_name(TWIN))
     if not source.is_dir() and source.name not in (TWIN, TCU_RESULT):
         files = (source,)
@@ -136,14 +101,6 @@ def _simulate_controller(twin: Path, request: Simulate) -> Outcome:
 
     Raises InputError for options of other twins, and the typed errors of the reader.
     """
-    from drivetwin._util.atomic import write_text
-    from drivetwin.files.bus_file import load_tcu_twin, record_prediction
-    from drivetwin.report.blocks import Tone, make_notes
-    from drivetwin.report.bus import build_prediction_table, build_predictions_page
-    from drivetwin.report.html import save_page
-    from drivetwin.tcu.log import read_controller_log
-    from drivetwin.tcu.outcome import list_unfitted_kinds, predict
-
     unused = ("vehicle", "step", "parameters", "from_command", "template")
     reason = "the twin of a gearbox control's log is driven by its commands"
     request.refuse_stated(unused, reason)
@@ -182,13 +139,6 @@ def _format_rows(predictions: Sequence[PredictedShift]) -> str:
 
 def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
     """Simulate a recording by a fitted model with the start adapted, and write pages."""
-    from drivetwin.cli.fit import read_recordings
-    from drivetwin.fit.fit import predict_recording
-    from drivetwin.fit.model_file import read_model
-    from drivetwin.report.blocks import build_findings_section
-    from drivetwin.report.fit import build_prediction_blocks, build_prediction_page
-    from drivetwin.report.html import save_page
-
     allowed = {"twin", "log", "output"}
     request.refuse_stated(
         {one for one in request.stated if one not in allowed},
@@ -213,20 +163,12 @@ def _simulate_fit(made: MadeResult, request: Simulate) -> Outcome:
 
 def _write_page(path: Path, twin: Twin, runs: Sequence[Validation], log: str) -> None:
     """Write a page with measurement and simulation of each shift."""
-    from drivetwin.report.comparison import build_comparison_page, make_trial_label
-    from drivetwin.report.find_reports import Candidate, Trial
-    from drivetwin.report.html import save_page
-
     trials = [Trial(make_trial_label(log, run.shift), {twin.name: run}, {}) for run in runs]
     save_page(path, build_comparison_page([Candidate.from_twin(twin.name, twin)], trials))
 
 
 def _apply_parameters(twin: Twin, parameters: Path, template: Path | None) -> Twin:
     """The twin with the values of a parameter file, and what that changed on stderr."""
-    from drivetwin.export.parameters.files import read_parameters, read_template, restore_entries
-    from drivetwin.export.parameters.of_twin import collect_parameters
-    from drivetwin.export.parameters.to_twin import update_twin
-
     content = read_parameters(parameters)
     if template is not None:
         content = restore_entries(content, collect_parameters(twin), read_template(template))

@@ -5,76 +5,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from drivetwin._util.display_units import format_uncertainty, get_display_unit
-from drivetwin._util.request import LOG_ENDINGS, Request, option, output_file, output_folder
+from drivetwin.cli.identify import run_identification, write_outcome
 from drivetwin.cli.options import REPORT
 from drivetwin.cli.output import show_step, write_atomically, write_texts
+from drivetwin.cli.requests.identification import Demonstrate, IdentifyOptions, Synthesize
+from drivetwin.dyno.dyno import DynoRun, run
+from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenario_file import (
+    convert_channels,
+    format_card,
+    format_log,
+    format_truth,
+    load_scenario,
+)
+from drivetwin.dyno.truth import Truth, parse_effects
+from drivetwin.errors import InputError, Where
+from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
+from drivetwin.fit.synthesize import find_model, synthesize_log
+from drivetwin.logs.write import write_log
+from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import Column, Outcome, TableBlock, TextBlock, make_table
-from drivetwin.vehicle.effects import EffectId
-
-if TYPE_CHECKING:
-    from drivetwin.dyno.dyno import DynoRun
-    from drivetwin.dyno.truth import Truth
-    from drivetwin.estimation.identification import Identification
-
-
-class Bench(Request):
-    """Scenario and sensor noise of the virtual dynamometer."""
-
-    scenario: ScenarioName = option(
-        "paper: the paper's numbers at constant engine torque; paper_steps: the same with "
-        "throttle steps; throttle_steps: a long, strongly modulated 2nd gear; gearbox: a whole "
-        "gearbox with drums that have inertia; gearbox_chain: the same from 2nd to 4th gear; "
-        "power_on_down, power_off_up, power_off_down: the other kinds of shift; input_gear: behind "
-        "an input gear of 1.2; dual_clutch, manual: a car with such a gearbox; "
-        "open_converter: behind an open torque converter; hydraulics: with the commands of the "
-        "controller; controller_log: twelve shifts as a gearbox control logs them (synth).",
-        metavar="NAME",
-        default=ScenarioName.PAPER_STEPS,
-    )
-    seed: int = option("Seed of the sensor noise.", minimum=0, default=0)
-    noise: float = option("Factor on the sensor noise; 0: neither noise nor rounding.", default=1.0)
-
-
-class Synthesize(Bench, command="synth"):
-    """Arguments of `synth`."""
-
-    output: Path = output_file(
-        "Log to write; the ending .csv, .mf4, .parquet or .mat sets the format.",
-        "NAME.csv",
-        LOG_ENDINGS,
-        Path("synth.csv"),
-    )
-    model: str | None = option(
-        "Model file of 'drivetwin fit' with a manoeuvre, in place of a scenario: a file, or "
-        "engine_start, tip_in, converter_lock_up.",
-        metavar="MODEL",
-        excludes=("scenario", "torque_reduction", "drum", "effect"),
-    )
-    torque_reduction: float = option(
-        "Share by which the engine torque is reduced in the inertia phase.", default=0.0
-    )
-    drum: float | None = option(
-        "Inertia of each brake drum in the gearbox scenarios; default: 0.05.", metavar="KGM2"
-    )
-    effect: tuple[str, ...] = option(
-        "Effect that the dual-clutch model lacks, repeatable; units and shares are those of "
-        f"docs/howto/synthetic-log.md: {', '.join(EffectId)}.",
-        metavar="NAME=SIZE",
-        default=(),
-    )
+from drivetwin.tcu.synthesize import make_log
 
 
 def synth(request: Synthesize) -> Outcome:
-    """Make a shift log with known truth on the virtual dynamometer.
-
-    Also write the truth NAME.truth.json and the vehicle card NAME.card.toml. With a model the log
-    is one of its driveline, and the model file NAME.model.toml has first guesses.
-    """
+    """Write a log with its card or model and its truth."""
     write = _write_scenario_log if request.model is None else _write_model_log
     if request.model is None and request.scenario is ScenarioName.CONTROLLER_LOG:
         write = _write_controller_log
@@ -85,10 +47,6 @@ def synth(request: Synthesize) -> Outcome:
 
 def _write_scenario_log(request: Synthesize) -> dict[str, Path]:
     """Write log, card and truth of a scenario, all or none; return their paths."""
-    from drivetwin.dyno.dyno import run
-    from drivetwin.dyno.scenario_file import load_scenario
-    from drivetwin.dyno.truth import parse_effects
-
     setup = load_scenario(request.scenario, request.drum)
     setup = setup.set_torque_reduction(request.torque_reduction)
     effects = parse_effects(request.effect)
@@ -99,9 +57,6 @@ def _write_scenario_log(request: Synthesize) -> dict[str, Path]:
 
 def _write_controller_log(request: Synthesize) -> dict[str, Path]:
     """Write log, card and truth of shifts as a gearbox control logs them, all or none."""
-    from drivetwin.errors import InputError, Where
-    from drivetwin.tcu.synthesize import make_log
-
     output, place = request.output, Where(file=str(request.output))
     if output.suffix.casefold() != ".csv":
         what = "the log of a gearbox control is a CSV file"
@@ -121,9 +76,6 @@ def _write_controller_log(request: Synthesize) -> dict[str, Path]:
 
 def _write_model_log(request: Synthesize) -> dict[str, Path]:
     """Write log, model file and truth of the manoeuvre of a model, all or none."""
-    from drivetwin.errors import InputError, Where
-    from drivetwin.fit.synthesize import find_model, synthesize_log
-
     output, place = request.output, Where(file=str(request.output))
     if output.suffix.casefold() != ".csv":
         raise InputError("the log of a model is a CSV file", "give a name that ends in .csv", place)
@@ -143,9 +95,6 @@ def write_run(output: Path, run: DynoRun) -> tuple[Path, Path, Path]:
     A CSV log is one table in which slow channels hold their value, as a data logger writes it; the
     other formats keep each channel's own time base.
     """
-    from drivetwin.dyno.scenario_file import convert_channels, format_card, format_log, format_truth
-    from drivetwin.logs.write import write_log
-
     card, truth = output.with_suffix(".card.toml"), output.with_suffix(".truth.json")
     texts = {card: format_card(run.scenario), truth: format_truth(run)}
     if output.suffix.casefold() == ".csv":
@@ -188,18 +137,8 @@ _SLIPS = (10.0, 30.0, 50.0, 80.0)
 """Slips [rad/s] at which friction coefficients are compared."""
 
 
-class Demonstrate(Bench, command="demo"):
-    """Arguments of `demo`."""
-
-    output: Path = output_folder("Folder for all files.", default=Path("drivetwin-demo"))
-
-
 def demo(request: Demonstrate) -> Outcome:
-    """Identify a synthetic log with known truth by two methods, and compare."""
-    from drivetwin.cli.identify import IdentifyOptions, run_identification, write_outcome
-    from drivetwin.dyno.dyno import run as run_dyno
-    from drivetwin.dyno.scenario_file import load_scenario
-
+    """Make a log, identify it by both methods, and compare with the truth."""
     scenario, output = request.scenario, request.output
     bench = run_dyno(load_scenario(scenario), request.seed, noise=request.noise)
     log, card, _ = write_run(output / f"{scenario}.csv", bench)
@@ -225,10 +164,6 @@ def _compare(truth: Truth, found: Mapping[Method, Identification]) -> list[dict[
 
     Each has the true value, the SI unit, and by method the value with its total 95 % interval.
     """
-    import numpy as np
-
-    from drivetwin.parameters import get_parameter_spec
-
     rows: list[dict[str, Any]] = [
         {"id": key, "truth": value, "unit": get_parameter_spec(key).unit}
         | {method.value: _get_estimate(one, key) for method, one in found.items()}
@@ -251,8 +186,6 @@ def _get_estimate(found: Identification, key: str) -> dict[str, Any]:
 
 def _get_friction(found: Identification, element: str, slip: float) -> dict[str, Any]:
     """The curve of an element at one slip; nothing outside the slip range seen."""
-    import numpy as np
-
     curve = found.friction.get(element)
     if curve is None or not curve.slip[0] <= slip <= curve.slip[-1]:
         return {"value": None, "ci95_total": None}

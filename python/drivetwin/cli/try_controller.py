@@ -6,57 +6,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from drivetwin._util.request import REQUIRED, SECOND, input_file, option, output_folder
 from drivetwin.calibration.options import ShiftOptions
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.cli.calibrate import compile_controller
-from drivetwin.cli.options import REPORT, TwinInput
+from drivetwin.calibration.trial import Trial, run_trials
+from drivetwin.calibration.trial_comparison import Difference, compare_trials
+from drivetwin.calibration.twin_task import Request
+from drivetwin.cli.calibrate import compile_controller, load_valid_twin
+from drivetwin.cli.export import parse_gears
+from drivetwin.cli.options import REPORT
 from drivetwin.cli.output import show_step, write_texts
+from drivetwin.cli.requests.use import Try
+from drivetwin.files.limits_file import STOCK, TrialFile, load_trials
 from drivetwin.report.blocks import Outcome
-
-if TYPE_CHECKING:
-    from drivetwin.calibration.trial import Trial
-    from drivetwin.calibration.trial_comparison import Difference
-    from drivetwin.files.limits_file import TrialFile
-    from drivetwin.twin.twin import Twin
+from drivetwin.report.trial import build_trial_blocks, build_trials_page, format_junit
+from drivetwin.twin.twin import Twin
 
 JUNIT = "junit.xml"
 FAILED = 1
 """Exit code where an assertion fails."""
 
 
-class Try(ShiftOptions, TwinInput, command="try"):
-    """Arguments of `try`."""
-
-    shift: str = option("Shift of the scenarios that state none, such as 2-3.",
-                        metavar="GEAR-GEAR", default=REQUIRED)  # fmt: skip
-    controller: Path = input_file("Parameter file of your controller in C.", default=REQUIRED)
-    against: Path | None = input_file("Parameter file of a second controller, on the same draws.")
-    scenarios: Path | None = input_file("Scenarios and assertions (TOML); else those in stock.")
-    draws: int = option("Drawn units of each scenario.", minimum=1, maximum=100_000, default=16)
-    task: float | None = option(
-        "Time between two commands, in place of that of the file.",
-        unit=SECOND,
-        minimum=1e-3,
-        maximum=0.1,
-    )
-    output: Path | None = output_folder("Folder for report.html and junit.xml.")
-
-
 def try_controller(request: Try) -> Outcome:
-    """Test a controller in C on drawn units of a twin, with faults and assertions.
-
-    Run the scenarios of a file, or those in stock: mass, gradient, oil, torque, pedal, weak
-    clutches, slow filling, late, stuck and lost signals. With --against, compare a second
-    controller on the same draws. Exit code 1 where an assertion of the controller fails.
-    """
-    from drivetwin.calibration.trial_comparison import compare_trials
-    from drivetwin.cli.calibrate import load_valid_twin
-    from drivetwin.files.limits_file import STOCK, load_trials
-    from drivetwin.report.trial import build_trial_blocks, build_trials_page, format_junit
-
+    """Run the scenarios by one or two controllers, and write page and JUnit file."""
     twin, trials = load_valid_twin(request.twin), load_trials(request.scenarios or STOCK)
     found = _run(twin, trials, request, request.controller)
     differences: list[Difference] = []
@@ -84,9 +56,6 @@ def try_controller(request: Try) -> Outcome:
 
 
 def _run(twin: Twin, trials: TrialFile, request: Try, path: Path) -> list[Trial]:
-    from drivetwin.calibration.trial import run_trials
-    from drivetwin.calibration.twin_task import Request
-    from drivetwin.cli.export import parse_gears
 
     asked = Request(
         **request.select(ShiftOptions),

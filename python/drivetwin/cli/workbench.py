@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import typer
 
 from drivetwin._util.atomic import ignore_interrupts
-from drivetwin._util.request import Request, argument, input_file, option
 from drivetwin.cli.output import print_line
+from drivetwin.cli.requests.desk import OpenWorkbench
 from drivetwin.errors import MissingExtraError
+from drivetwin.report.blocks import Outcome
 
 if TYPE_CHECKING:
     from werkzeug.serving import BaseWSGIServer
@@ -25,24 +26,8 @@ _LINK_PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><titl
 """
 
 
-class OpenWorkbench(Request, command="app"):
-    """Arguments of `app`."""
-
-    log: Path | None = argument("Log to open, inside the folder.", "[LOG]", default=None)
-    vehicle: Path | None = input_file("Vehicle card (TOML).", "CARD")
-    channels: Path | None = input_file("Channel mapping file (TOML).", "MAP")
-    folder: Path = option(
-        "Folder for all files that are opened or saved.", metavar="DIR", default=Path()
-    )
-    port: int = option("Port; 0: any free port.", default=8050)
-    browser: bool = option("Open the page in a browser.", "--browser/--no-browser", default=True)
-
-
-def workbench(request: OpenWorkbench) -> None:
-    """Open the workbench in the browser: from a log to a validated model.
-
-    No network is needed. Access requires the printed link. Other machines cannot connect.
-    """
+def workbench(request: OpenWorkbench) -> Outcome:
+    """Start the server, open the browser, and serve until the program is ended."""
     _require_dash()
     from drivetwin.workbench.access_control import Access
     from drivetwin.workbench.jobs import end_all
@@ -62,6 +47,7 @@ def workbench(request: OpenWorkbench) -> None:
         with ignore_interrupts():
             end_all()
             sessions.close()
+    return Outcome()
 
 
 def _serve(

@@ -7,7 +7,10 @@ The command line imports them before anything numerical.
 from __future__ import annotations
 
 from enum import StrEnum
+from pathlib import Path
 from typing import Self
+
+from drivetwin._util.request import REQUIRED, Request, input_file, option
 
 
 class Names(StrEnum):
@@ -79,3 +82,23 @@ class Target(StrEnum):
         member._value_ = value
         member.label, member.text, member.ending = label, text, ending or value
         return member
+
+
+class ExportOptions(Request):
+    """Target of an export and its options."""
+
+    to: Target = option("Format of the export.", default=REQUIRED)
+    names: Names = option(
+        "For parameter files: naming convention of the parameters.", default=Names.DRIVETWIN
+    )
+    powertrain: str | None = option(
+        "For parameter files: add the torque converter of this powertrain (TOML or built-in).",
+        metavar="FILE",
+    )
+    template: Path | None = input_file(
+        "For parameter files: template with labels, units, axes and breakpoints (TOML)."
+    )
+    fmi: FmiVersion = option("For fmu: version of the standard.", default=FmiVersion.FMI2)
+    platforms: tuple[Platform, ...] = option(
+        "For fmu: target platform, built by zig; repeatable.", "--platform", default=()
+    )

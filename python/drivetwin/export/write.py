@@ -8,34 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivetwin._util.request import REQUIRED, Request, input_file, option
-from drivetwin.export.targets import FmiVersion, Names, Platform, Target
+from drivetwin.export.targets import ExportOptions, Target
 
 if TYPE_CHECKING:
     from drivetwin.export.entries import Subject
     from drivetwin.export.fmu.build import Experiment
     from drivetwin.export.parameters.content import ParameterSet
     from drivetwin.twin.twin import Twin
-
-
-class ExportOptions(Request):
-    """Target of an export and its options."""
-
-    to: Target = option("Format of the export.", default=REQUIRED)
-    names: Names = option(
-        "For parameter files: naming convention of the parameters.", default=Names.DRIVETWIN
-    )
-    powertrain: str | None = option(
-        "For parameter files: add the torque converter of this powertrain (TOML or built-in).",
-        metavar="FILE",
-    )
-    template: Path | None = input_file(
-        "For parameter files: template with labels, units, axes and breakpoints (TOML)."
-    )
-    fmi: FmiVersion = option("For fmu: version of the standard.", default=FmiVersion.FMI2)
-    platforms: tuple[Platform, ...] = option(
-        "For fmu: target platform, built by zig; repeatable.", "--platform", default=()
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.errors import InputError
-from drivetwin.export.targets import FmiVersion, Target
-from drivetwin.export.write import ExportOptions
+from drivetwin.export.targets import ExportOptions, FmiVersion, Target
 from drivetwin.workbench.views.export import Record, make_product
 
 TARGETS = {

@@ -18,8 +18,8 @@ from dash.development.base_component import Component
 from drivetwin._util.request import Request, get_arguments
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.estimation.identification import Identification
-from drivetwin.export.targets import Target
-from drivetwin.export.write import ExportedModel, ExportOptions, write_export
+from drivetwin.export.targets import ExportOptions, Target
+from drivetwin.export.write import ExportedModel, write_export
 from drivetwin.files.twin_file import save_twin
 from drivetwin.report.bus import BusOutcome
 from drivetwin.workbench import jobs, what_if

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.cli.options import read_twin_log
+from drivetwin.cli.input_files import read_twin_log
 from drivetwin.errors import MissingChannelError
 from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.twin.twin import Twin

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin._util.request import FileRole
-from drivetwin.cli.options import recognise_file, require_kind
+from drivetwin.cli.input_files import recognise_file, require_kind
 from drivetwin.errors import CardError, FileFormatError, ResultFileError
 
 CARD = 'name = "truck"\nfinal_drive = 5.0\n[[gears]]\nname = "2"\n[elements.B2]\nP0_bar = 0.8\n'
