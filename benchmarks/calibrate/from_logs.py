@@ -35,14 +35,14 @@ from benchmarks.calibrate.true_units import draw_true_units, record_shift
 from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Task, build_objective, find_best, make_quick_plant
-from drivetwin.calibration.driven import DrivenShift, match_profiles
+from drivetwin.calibration.compared_shift import DrivenShift, match_profiles
 from drivetwin.calibration.learn import correct_twin, require_explained
+from drivetwin.calibration.maneuver import Profiles
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Objective
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
-from drivetwin.calibration.profiles import Profiles
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task, choose_start

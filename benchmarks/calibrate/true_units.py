@@ -14,9 +14,8 @@ from benchmarks.calibrate.true_vehicle import MadeVehicle
 from benchmarks.estimation.vehicles import draw_errors, misread_channels
 from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.input_path import DIRECT
-from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
+from drivetwin.calibration.maneuver import Control, Maneuver, OperatingPoint, Profiles
 from drivetwin.calibration.metrics import Metric, Outcome
-from drivetwin.calibration.profiles import Control, Profiles
 from drivetwin.calibration.scenarios import Scenarios, collect_scenarios, scale_units
 from drivetwin.calibration.spread import Spread
 from drivetwin.channels.roles import get_command_element

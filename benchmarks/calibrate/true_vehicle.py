@@ -30,10 +30,9 @@ from benchmarks.estimation.vehicles import (
 )
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
-from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.maneuver import ClosedLoop, Maneuver
 from drivetwin.calibration.metrics import Metric, Runs, compute_metrics
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request
 from drivetwin.channels.roles import Quantity, make_command_role

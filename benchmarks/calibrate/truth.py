@@ -22,9 +22,9 @@ import numpy as np
 
 from benchmarks.calibrate.true_vehicle import make_vehicle, measure_true_shift
 from drivetwin.calibration.calibrate import Assessment, calibrate
+from drivetwin.calibration.maneuver import ClosedLoop
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import build_task
 from drivetwin.errors import DrivetwinError

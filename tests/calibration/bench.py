@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.calibration.driven import DrivenShift
+from drivetwin.calibration.compared_shift import DrivenShift
 from drivetwin.calibration.input_path import DIRECT
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.policies.kind import PolicyKind

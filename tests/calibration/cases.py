@@ -11,9 +11,9 @@ import numpy as np
 
 from drivetwin.calibration.calibrate import Task, draw_for
 from drivetwin.calibration.evaluate import Plant
+from drivetwin.calibration.maneuver import ClosedLoop, compute_nominal_profiles
 from drivetwin.calibration.metrics import list_outputs
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.profiles import ClosedLoop, compute_nominal_profiles
 from drivetwin.calibration.scenarios import Purpose, collect_scenarios
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task

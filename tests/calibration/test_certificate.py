@@ -9,11 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from drivetwin.calibration.certificate import certify
+from drivetwin.calibration.certificate import certify, compute_promise
 from drivetwin.calibration.front import Arm, FrontPoint, select_nondominated
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Statistic
-from drivetwin.calibration.promise import compute_promise
 from drivetwin.calibration.scenarios import Scenarios
 from tests.support.arrays import FloatArray
 

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from drivetwin.calibration.keep_limits import keep_limits
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, Statistic
-from drivetwin.calibration.polish import Linear, assemble_program, polish
+from drivetwin.calibration.polish import Linear, assemble_program, keep_limits, polish
 from tests.support.arrays import FloatArray
 
 DRAWS = np.linspace(-1.0, 1.0, 20)

@@ -13,9 +13,8 @@ from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
-from drivetwin.calibration.oil import OilFriction
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.spread import OilFriction, Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.result.estimate import Verdict

@@ -14,17 +14,21 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import TimedStages
-from drivetwin.calibration.certificate import Certificate, certify
+from drivetwin.calibration.certificate import Certificate, certify, compute_promise
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.keep_limits import TOLERANCE, keep_limits
 from drivetwin.calibration.lower_bound import compute_lower_bound
-from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.maneuver import Control, Maneuver, Profiles, compute_nominal_profiles
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
 from drivetwin.calibration.policy import Policy, Space
-from drivetwin.calibration.polish import Run, polish
-from drivetwin.calibration.profiles import Control, Profiles, compute_nominal_profiles
-from drivetwin.calibration.promise import compute_promise
+from drivetwin.calibration.polish import (
+    TOLERANCE,
+    Candidate,
+    Run,
+    keep_limits,
+    polish,
+    search_minima,
+)
 from drivetwin.calibration.scenarios import (
     Draw,
     Purpose,
@@ -32,7 +36,6 @@ from drivetwin.calibration.scenarios import (
     draw_scenarios,
     draw_types,
 )
-from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings
 
 _COARSE = 2e-3

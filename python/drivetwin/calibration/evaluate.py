@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.maneuver import ClosedLoop, Control, Maneuver
 from drivetwin.calibration.metrics import (
     OF_INPUTS,
     Metric,
@@ -18,7 +18,6 @@ from drivetwin.calibration.metrics import (
     compute_metrics,
     list_outputs,
 )
-from drivetwin.calibration.profiles import ClosedLoop, Control
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import BatchRequest, Keep
 from drivetwin.simulation.element_schema import as_json

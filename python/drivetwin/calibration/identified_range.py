@@ -6,8 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.profiles import Profiles
+from drivetwin.calibration.maneuver import Maneuver, Profiles
 from drivetwin.errors import Where
 from drivetwin.findings import Finding
 from drivetwin.simulation.driveline_run import DrivelineTask

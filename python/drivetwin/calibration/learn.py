@@ -20,11 +20,10 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import notify_progress, scale_progress
-from drivetwin.calibration.compared_shift import ComparedShift, PhaseDeviation
-from drivetwin.calibration.designed_normals import design_normals
-from drivetwin.calibration.driven import DrivenShift
+from drivetwin.calibration.compared_shift import ComparedShift, DrivenShift, PhaseDeviation
 from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.units import design_normals
 from drivetwin.calibration.vehicle_unknowns import (
     ADDED_ELEMENTS,
     AddedUnknown,

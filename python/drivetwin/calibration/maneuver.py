@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The shift to be calibrated: driveline, operating point, request and time grid."""
+"""The shift to be calibrated: driveline, operating point, request, time grid, and its control.
+
+The control is by profiles of engine torque and pressures, or by a controller behind actuators.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.input_path import DIRECT, InputPath
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, SimulationError
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline import (
     CRANK,
@@ -27,7 +30,80 @@ from drivetwin.simulation.driveline import (
 )
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement, Signal, State
 from drivetwin.simulation.network import Element, Start
-from drivetwin.simulation.shift_control import ControlledNetwork, ControlledUnit
+from drivetwin.simulation.shift_control import (
+    INPUTS,
+    AnyController,
+    ControlledNetwork,
+    ControlledUnit,
+    simulate_network_controlled,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Engine torque [N m] and pressures [Pa] at the clutches, linear between their corners."""
+
+    engine_torque: Signal
+    offgoing: Signal
+    oncoming: Signal
+
+    @property
+    def signals(self) -> dict[str, Signal]:
+        """Signals by name, as files and figures call them."""
+        return {
+            "engine_torque": self.engine_torque,
+            "pressure.offgoing": self.offgoing,
+            "pressure.oncoming": self.oncoming,
+        }
+
+    def sample(self, time: FloatArray) -> Profiles:
+        """Return the profiles with corners at `time` (n,) [s] alone.
+
+        The core passes samples of one distance with one operator; corners between them need their
+        own in every run.
+        """
+        return Profiles(
+            *(
+                Signal(time, np.interp(time, one.arrival, one.values))
+                for one in (self.engine_torque, self.offgoing, self.oncoming)
+            )
+        )
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """Controller, and the actuators of the nominal unit."""
+
+    controller: AnyController
+    unit: ControlledUnit
+
+
+Control = Profiles | ClosedLoop
+"""Control of a shift."""
+
+
+def compute_nominal_profiles(maneuver: Maneuver, control: Control) -> Profiles:
+    """Return engine torque and pressures at the clutches of the nominal driveline.
+
+    Raises SimulationError where its run fails.
+    """
+    if isinstance(control, Profiles):
+        return control
+    plant = maneuver.build_controlled([control.unit], {})
+    batch = simulate_network_controlled(
+        plant, [control.controller], maneuver.time, [maneuver.body.drive], with_inputs=True
+    )
+    if batch.failed:
+        raise SimulationError(
+            f"the shift of the nominal driveline failed: {batch.failed[0]}",
+            "give another start of the policy, or another operating point",
+        )
+    columns = dict(zip(INPUTS, batch.inputs[0, 0], strict=True))
+    return Profiles(
+        engine_torque=Signal(maneuver.time, columns["engine_torque"]),
+        offgoing=Signal(maneuver.time, columns["pressure.offgoing"]),
+        oncoming=Signal(maneuver.time, columns["pressure.oncoming"]),
+    )
 
 
 @dataclass(frozen=True)

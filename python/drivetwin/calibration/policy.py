@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.profiles import Control
+from drivetwin.calibration.maneuver import Control
 from drivetwin.errors import InputError
 
 _AT_BOUND = 0.01

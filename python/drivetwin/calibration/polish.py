@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Local polish by sequential linear programming with a trust region.
+"""Search for policy values: global hops, local polish, and repair of exceeded limits.
 
-In each step peak jerk and limits are linear in the coordinates, by forward differences over the
-scenarios near their tails. The linear program minimises the tail mean of peak jerk in its epigraph
-form and the excess over limits. Source: J. Nocedal and S. J. Wright, Numerical Optimization,
-section 18.5 (Sℓ1LP); R. T. Rockafellar and S. Uryasev, Journal of Risk 2 (2000), for the tail mean.
+The search goes by short polishes from random starts, then from hops of a pool of the best. A
+polish is sequential linear programming with a trust region: in each step peak jerk and limits are
+linear in the coordinates, by forward differences over the scenarios near their tails. The linear
+program minimises the tail mean of peak jerk in its epigraph form and the excess over limits.
+
+Sources: D. Wales and J. Doye, Global optimization by basin-hopping, J. Phys. Chem. A 101 (1997);
+J. Nocedal and S. J. Wright, Numerical Optimization, section 18.5 (Sℓ1LP); R. T. Rockafellar and S.
+Uryasev, Journal of Risk 2 (2000), for the tail mean.
 """
 
 from __future__ import annotations
@@ -19,10 +23,73 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, hstack
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import spell_unit
 from drivetwin._util.progress import notify_progress
-from drivetwin.calibration.metrics import Metric, Outcome
+from drivetwin.calibration.certificate import LimitCheck
+from drivetwin.calibration.metrics import METRICS, Metric, Outcome
 from drivetwin.calibration.objective import Objective, Statistic
-from drivetwin.calibration.search import Candidate
+from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.errors import InfeasibleError
+
+_POOL = 6
+"""Minima from which hops start."""
+_CLOSE = 0.02
+"""Largest distance of coordinates at which two minima count as one."""
+_RANK = 1.2
+"""Scale of the exponential law by which a hop chooses the rank of its minimum."""
+_PARTIAL, _PARTIAL_STEP = 0.3, 2.5
+"""Share of the coordinates that a partial hop moves, and its step over that of a full one."""
+_CROSS_STEP = 0.3
+"""Step of a hop between two minima, over that of a full one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Coordinates (q,) and their objective."""
+
+    coordinates: FloatArray
+    value: float
+
+
+def search_minima(
+    improve: Callable[[FloatArray], Candidate],
+    start: FloatArray,
+    settings: CalibrationSettings,
+    seed: int,
+) -> list[Candidate]:
+    """Return the pool of minima, best first.
+
+    `improve` polishes coordinates (q,) and returns them with the objective on other draws.
+    """
+    random = np.random.default_rng([seed, 5])
+    total, pool = settings.starts + settings.hops, list[Candidate]()
+    for number in range(total):
+        notify_progress(number / total)
+        if number == 0:
+            at = start
+        elif number < settings.starts:
+            at = start + settings.initial_step * random.standard_normal(start.size)
+        else:
+            at = _hop(pool[:_POOL], settings.hop_step, random)
+        found = improve(np.clip(at, 0.0, 1.0))
+        near = [one for one in pool if np.abs(one.coordinates - found.coordinates).max() < _CLOSE]
+        if all(found.value < one.value for one in near):
+            others = (one for one in pool if one not in near)
+            pool = sorted([*others, found], key=lambda one: one.value)
+    return pool[:_POOL]
+
+
+def _hop(pool: list[Candidate], step: float, random: np.random.Generator) -> FloatArray:
+    """Move from a minimum of the pool: all coordinates, some, or towards another minimum."""
+    at = pool[min(int(random.exponential(_RANK)), len(pool) - 1)].coordinates
+    noise, kind = random.standard_normal(at.size), random.random()
+    if kind < 0.5:
+        return at + step * noise
+    if kind < 0.75:
+        return at + _PARTIAL_STEP * step * noise * (random.random(at.size) < _PARTIAL)
+    other = pool[int(random.integers(len(pool)))].coordinates
+    return at + random.uniform(-0.3, 1.3) * (other - at) + _CROSS_STEP * step * noise
+
 
 Run = Callable[[Sequence[FloatArray], NDArray[np.intp] | None], list[Outcome]]
 """Outcomes of candidates, coordinates (q,), over the scenarios of some places; None takes all."""
@@ -230,3 +297,85 @@ def assemble_program(
     )
     matrix = hstack([csr_array(slope), csr_array(threshold[:, None]), slack], format="csr")
     return Program(at, cost, matrix, -value, jerk.owner)
+
+
+TOLERANCE = 0.01
+"""Relative excess over a limit from which the limit counts as out of reach."""
+
+
+def keep_limits(
+    measure: Callable[[FloatArray], list[float]],
+    improve: Callable[[FloatArray, Objective], FloatArray],
+    start: FloatArray,
+    objective: Objective,
+    rounds: int,
+    factor: float,
+) -> Candidate:
+    """Polish under tighter limits until all are kept.
+
+    The polish sees few draws, and its penalty is soft: where comfort gains more by an excess than
+    the excess costs, the limit is exceeded.
+
+    Parameters
+    ----------
+    measure
+        Relative excess of coordinates (q,) over each limit, on draws of their own.
+    improve
+        Coordinates (q,) after a polish.
+    start
+        Coordinates (q,).
+    objective
+        Objective of the first polish.
+    rounds
+        Largest number of polishes, each with bounds lower by the excess before it.
+    factor
+        Factor on the weight of the excess from one polish to the next.
+
+    Returns
+    -------
+    Candidate
+        The first coordinates that keep all limits, or those with the least excess, and that excess.
+    """
+    at, tried = start, []
+    for number in range(rounds + 1):
+        excesses = measure(at)
+        tried.append(Candidate(at, max(excesses, default=0.0)))
+        if tried[-1].value <= 0.0 or number == rounds:
+            break
+        beyond = [max(one, 0.0) for one in excesses]
+        tighter = objective.tighten([one / (1.0 + one) for one in beyond])
+        objective = tighter.scale_weight(factor)
+        at = improve(at, objective)
+    return min(tried, key=lambda one: max(one.value, 0.0))
+
+
+def require_limits(found: Sequence[LimitCheck], start: Sequence[LimitCheck]) -> None:
+    """Raise InfeasibleError where a limit is exceeded by more than 1 %, by its estimate.
+
+    `found` are the limits on fresh draws of a calibration, `start` those of its start.
+    """
+    pairs = zip(found, start, strict=True)
+    exceeded = [(one, old) for one, old in pairs if one.value > (1.0 + TOLERANCE) * one.limit.bound]
+    if exceeded:
+        raise InfeasibleError(
+            f"no calibration within the {len(found)} limits was found; the best exceeds "
+            + "; ".join(_describe_excess(*one) for one in exceeded),
+            f"raise {' and '.join(_describe_remedy(one) for one, _ in exceeded)}, relax another "
+            "limit that works against it, or search longer (--effort)",
+        )
+
+
+def _describe_excess(one: LimitCheck, start: LimitCheck) -> str:
+    spec, bound = METRICS[one.limit.metric], one.limit.bound
+    unit = spell_unit(spec.unit)
+    return (
+        f"{spec.label} ({one.limit.statistic}) {one.value:.4g} {unit}, limit {bound:.4g}: "
+        f"{one.value - bound:.2g} {unit} or {100.0 * (one.value / bound - 1.0):.1f} % "
+        f"above it (start: {start.value:.4g} {unit})"
+    )
+
+
+def _describe_remedy(one: LimitCheck) -> str:
+    spec = METRICS[one.limit.metric]
+    value = one.value if one.upper is None else one.upper
+    return f"the limit of the {spec.label} to {value:.3g} {spell_unit(spec.unit)}"

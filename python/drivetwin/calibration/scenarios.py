@@ -17,11 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.designed_normals import list_designed
 from drivetwin.calibration.maneuver import Maneuver
-from drivetwin.calibration.oil import SAME_OIL, OilState
-from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.units import DrawActuators
+from drivetwin.calibration.spread import SAME_OIL, OilState, Spread
+from drivetwin.calibration.units import DrawActuators, list_designed
 from drivetwin.errors import InputError
 from drivetwin.parameters import OVER_ETA
 from drivetwin.shifts.shift import Shift

@@ -20,7 +20,6 @@ from drivetwin.calibration.calibrate import calibrate as run_calibration
 from drivetwin.calibration.front import Front, trace_front
 from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.identified_range import check_identified_range
-from drivetwin.calibration.keep_limits import require_limits
 from drivetwin.calibration.learn import Correction
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import Grid, OperatingMap, calibrate_map
@@ -28,6 +27,7 @@ from drivetwin.calibration.options import CalibrationOptions
 from drivetwin.calibration.policies import own
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.own import UserController
+from drivetwin.calibration.polish import require_limits
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task, choose_start
 from drivetwin.cli.calibrate_logs import (

@@ -14,7 +14,7 @@ from drivetwin.cli.output import show_step
 from drivetwin.errors import InputError, Where
 
 if TYPE_CHECKING:
-    from drivetwin.calibration.driven import DrivenShift
+    from drivetwin.calibration.compared_shift import DrivenShift
     from drivetwin.calibration.learn import Correction
     from drivetwin.calibration.twin_task import Request
     from drivetwin.findings import Finding
@@ -75,7 +75,7 @@ def correct_by_logs(
 def _match(
     twin: Twin, logged: Sequence[LoggedShift], request: Request, starts: Sequence[StartFile]
 ) -> list[DrivenShift]:
-    from drivetwin.calibration.driven import DrivenShift, match_profiles
+    from drivetwin.calibration.compared_shift import DrivenShift, match_profiles
     from drivetwin.calibration.twin_task import build_profiles
 
     profiles, shift = {}, None

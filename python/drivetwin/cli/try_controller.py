@@ -9,8 +9,7 @@ from pathlib import Path
 
 from drivetwin.calibration.options import ShiftOptions
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.trial import Trial, run_trials
-from drivetwin.calibration.trial_comparison import Difference, compare_trials
+from drivetwin.calibration.trial import Difference, Trial, compare_trials, run_trials
 from drivetwin.calibration.twin_task import Request
 from drivetwin.cli.calibrate import compile_controller, load_valid_twin
 from drivetwin.cli.export import parse_gears

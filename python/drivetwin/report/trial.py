@@ -16,8 +16,7 @@ from drivetwin.calibration.calibrate import Assessment, Calibration
 from drivetwin.calibration.evaluate import Plant, get_vehicle_inertias
 from drivetwin.calibration.metrics import METRICS, Metric, compute_acceleration
 from drivetwin.calibration.objective import Statistic
-from drivetwin.calibration.trial import Check, Scale, Trial
-from drivetwin.calibration.trial_comparison import Difference
+from drivetwin.calibration.trial import Check, Difference, Scale, Trial
 from drivetwin.report.blocks import (
     Block,
     FigureBlock,

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.maneuver import ClosedLoop, Maneuver
 from drivetwin.calibration.policy import Policy, PolicyParameter
-from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.simulation.shift_control import ControlledUnit, ExternalController
 
 HEADER = Path(__file__).with_name("drivetwin_controller.h")

@@ -12,9 +12,8 @@ from typing import Any
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import REFERENCE, ActuatorModel
-from drivetwin.calibration.maneuver import Maneuver
+from drivetwin.calibration.maneuver import ClosedLoop, Maneuver
 from drivetwin.calibration.policy import Policy, PolicyParameter
-from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.calibration.torque_balance import (
     INERTIA_TIME,
     REDUCTION,

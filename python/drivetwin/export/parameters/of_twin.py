@@ -14,10 +14,9 @@ import numpy as np
 from scipy.constants import zero_Celsius
 
 from drivetwin.calibration.calibrate import Calibration
-from drivetwin.calibration.maneuver import OperatingPoint
+from drivetwin.calibration.maneuver import ClosedLoop, OperatingPoint
 from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.calibration.policy import PolicyParameter
-from drivetwin.calibration.profiles import ClosedLoop
 from drivetwin.export.parameters.content import (
     Axis,
     Curve,

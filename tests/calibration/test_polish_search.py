@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import draw_for
+from drivetwin.calibration.polish import Candidate, search_minima
 from drivetwin.calibration.scenarios import Purpose
-from drivetwin.calibration.search import Candidate, search_minima
 from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task
