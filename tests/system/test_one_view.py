@@ -21,7 +21,7 @@ from drivetwin.report.html import build_joint_page, build_report_page, render_fr
 from drivetwin.report.notebook import build_identification_blocks
 from drivetwin.report.text import format_blocks
 from drivetwin.validation.simulate_log import attach_fit
-from drivetwin.workbench.views.blocks import render_block
+from drivetwin.workbench.views.widgets import render_block
 from tests.estimation.multi_log.fixtures import together
 from tests.report.sample import identification, log, validation
 from tests.support.fits import fit_log, make_log

@@ -14,8 +14,8 @@ import pytest
 from drivetwin import Method
 from drivetwin.errors import InputError, UnitError
 from drivetwin.vehicle.locks import Lock, LockKind
+from drivetwin.workbench.forms import Entry, list_rows
 from drivetwin.workbench.identifying import Boundary
-from drivetwin.workbench.mapping import Entry, list_rows
 from drivetwin.workbench.session_state import Source
 from tests.workbench.conftest import CARD, LOG, finish
 

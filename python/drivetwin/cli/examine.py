@@ -25,7 +25,7 @@ from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.analysis.profile_likelihood import Profile, compute_profile
 from drivetwin.estimation.data.prepare import collect_tolerances
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.files.analysis_files import (
+from drivetwin.files.result_file import (
     format_friction,
     format_improvements,
     format_profile,

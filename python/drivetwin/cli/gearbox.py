@@ -33,14 +33,12 @@ from drivetwin.report.blocks import Block, Outcome, Page, TextBlock, Tone, make_
 from drivetwin.report.drive import (
     build_drive_page,
     build_energy_table,
-    build_shift_table,
-    format_traces,
-)
-from drivetwin.report.gearbox import (
     build_gear_blocks,
     build_ratio_table,
     build_reduction_blocks,
+    build_shift_table,
     evaluate_reduction,
+    format_traces,
 )
 
 

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""`result.json`: everything an identification found, for machines."""
+"""`result.json`: everything an identification found, and files of what was asked about it.
+
+The files of `examine` are suggestions, profiles and friction curves, SI.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,10 +17,12 @@ from pydantic import Field, FiniteFloat, model_validator
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.optional_dependencies import get_program_version
-from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.plain_values import format_json, to_plain_values
+from drivetwin.estimation.analysis.friction_shape import ShapedFriction
+from drivetwin.estimation.analysis.profile_likelihood import Profile
 from drivetwin.estimation.identification import Identification, LogPull, LogShare
 from drivetwin.estimation.result.cause import Group
-from drivetwin.estimation.result.estimate import LoadLaw
+from drivetwin.estimation.result.estimate import ExperimentRanking, LoadLaw
 from drivetwin.estimation.result.method import Method, ModelStatus
 from drivetwin.estimation.result.validation import HeldOut, Outcome
 from drivetwin.files.records import (
@@ -31,6 +38,7 @@ from drivetwin.files.records import (
     SuggestionRecord,
     read_record,
 )
+from drivetwin.fit.examine import REPEATS, Improvement
 from drivetwin.shifts.shift import RejectedShift
 from drivetwin.vehicle.shift_kind import ShiftKind
 
@@ -225,3 +233,39 @@ def load_result(path: Path | str) -> ResultFile:
     Raises ResultFileError where it is missing, damaged or of a newer schema.
     """
     return read_record(path, json.loads, RESULT_SCHEMA, ResultFile)
+
+
+def format_suggestions(found: tuple[ExperimentRanking, ...]) -> str:
+    """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
+    rows = [SuggestionRecord.from_result(one).model_dump(mode="json") for one in found]
+    return format_json({"suggestions": rows})
+
+
+def format_improvements(found: Sequence[Improvement], units: Mapping[str, str]) -> str:
+    """`suggestions.json` of a fit: half widths of the intervals, and what would narrow them."""
+    rows = [{**asdict(one), "repeats": REPEATS, "unit": units[one.unknown]} for one in found]
+    return format_json({"suggestions": rows})
+
+
+def format_profile(one: Profile, unit: str) -> str:
+    """`profile.<parameter>.json`: rise of Q over the parameter, and both intervals."""
+    return format_json(
+        {
+            "parameter": one.parameter,
+            "unit": unit,
+            "estimate": one.estimate,
+            "ci95_profile": one.interval,
+            "ci95_linear": one.linear,
+            "values": one.values,
+            "rise": one.rise,
+        }
+    )
+
+
+def format_friction(one: ShapedFriction) -> str:
+    """`friction.json`: μ over slip of the shape asked for, by element, with its 95 % band."""
+    curves = {
+        name: FrictionRecord.from_result(curve).model_dump(mode="json")
+        for name, curve in one.curves.items()
+    }
+    return format_json({"shape": one.shape, "gain": one.gain, "bend": one.bend, "friction": curves})

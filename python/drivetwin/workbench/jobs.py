@@ -32,7 +32,7 @@ Work = Callable[..., None]
 _PRELOADED = [
     "drivetwin.workbench.sandboxed_parse",
     "drivetwin.workbench.identifying",
-    "drivetwin.workbench.uploads",
+    "drivetwin.workbench.workspace",
 ]
 _PATIENCE = 2.0
 """Time [s] that a process may take to end after the request."""

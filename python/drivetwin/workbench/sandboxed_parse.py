@@ -35,8 +35,8 @@ from drivetwin.logs.survey import Survey, find_shortest_step, survey_recording
 from drivetwin.plausibility.check import check_card, drop_card_findings, select_card_findings
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.vehicle.card import RatioCard, VehicleCard, is_ratio_card, load_card, load_ratio_card
+from drivetwin.workbench.forms import Corrections
 from drivetwin.workbench.jobs import Emit
-from drivetwin.workbench.mapping import Corrections
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,9 @@ from drivetwin.errors import InputError, RefusedError
 from drivetwin.workbench import jobs
 from drivetwin.workbench.access_control import ADDRESS, Access, make_refusal, protect
 from drivetwin.workbench.sessions import Sessions
-from drivetwin.workbench.uploads import LIMITS
 from drivetwin.workbench.views.fields import check_callback_requests, escape_callback_responses
 from drivetwin.workbench.views.page import Start, build_page
-from drivetwin.workbench.workspace import Folder
+from drivetwin.workbench.workspace import LIMITS, Folder
 
 SESSION_HEADER = "X-Drivetwin-Session"
 

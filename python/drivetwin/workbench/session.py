@@ -25,10 +25,9 @@ from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.report.figure import Figure
 from drivetwin.vehicle.locks import Lock
-from drivetwin.workbench import jobs, sandboxed_parse, uploads, what_if, workspace
-from drivetwin.workbench.card_form import CardForm
+from drivetwin.workbench import jobs, sandboxed_parse, what_if, workspace
+from drivetwin.workbench.forms import CardForm, Corrections, Entry, apply_entries
 from drivetwin.workbench.identifying import Boundary, Task, identify_all, identify_bus_logs
-from drivetwin.workbench.mapping import Corrections, Entry, apply_entries
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
 from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
 from drivetwin.workbench.workspace import Folder
@@ -68,7 +67,7 @@ class Session:
     def store_upload(self, stream: IO[bytes], name: str, claimed: int | None, limit: int) -> str:
         """Take an upload; returns the key to open it by. Raises RefusedError."""
         key = secrets.token_hex(8)
-        upload = uploads.store_stream(stream, name, claimed, self.scratch / key, limit)
+        upload = workspace.store_stream(stream, name, claimed, self.scratch / key, limit)
         with self.lock:
             used = {one.source.path for one in self.work.logs}
             used |= set() if self.work.card is None else {self.work.card.path}

@@ -17,8 +17,8 @@ from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import Source as FitSource
 from drivetwin.vehicle.card import RatioCard, VehicleCard
 from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
+from drivetwin.workbench.forms import Corrections
 from drivetwin.workbench.identifying import Boundary, BusTask, Outcome, Refusal, move_boundaries
-from drivetwin.workbench.mapping import Corrections
 from drivetwin.workbench.sandboxed_parse import Opened
 
 MOST_LOGS = 6

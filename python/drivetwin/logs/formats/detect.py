@@ -142,7 +142,7 @@ def _add_net_torque(opened: AbstractContextManager[Recording]) -> Iterator[Recor
         if not any("percenttorque" in one.name.casefold() for one in recording.columns):
             yield recording
             return
-        from drivetwin.logs.formats.j1939.torque import find_net_torque  # few logs are of a bus
+        from drivetwin.logs.formats.can.j1939 import find_net_torque  # few logs are of a bus
 
         net = find_net_torque(recording)
         yield recording if net is None else Joined((recording, net))

@@ -19,18 +19,18 @@ from drivetwin.errors import RefusedError
 from drivetwin.findings import render
 from drivetwin.report.sections.inputs import build_card_tables, build_ratio_tables
 from drivetwin.vehicle.card_fields import get_card_field
-from drivetwin.workbench.card_form import CardForm
+from drivetwin.workbench.forms import CardForm
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.sources import (
     build_file_buttons,
     format_source,
     register_opening,
 )
+from drivetwin.workbench.views.widgets import render_table
 
 _KEY = TypeAdapter(list[str | int])
 _EXISTING = {"keep": "keep it", "replace": "replace it"}

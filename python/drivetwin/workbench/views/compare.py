@@ -19,7 +19,7 @@ from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import render_section
+from drivetwin.workbench.views.widgets import render_section
 
 
 def layout() -> list[Component]:

@@ -24,8 +24,8 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import locks
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import render_block, render_section, render_table
 from drivetwin.workbench.views.log import build_facts_line
+from drivetwin.workbench.views.widgets import render_block, render_section, render_table
 
 
 class RunKind(StrEnum):

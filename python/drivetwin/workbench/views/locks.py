@@ -19,8 +19,8 @@ from drivetwin.vehicle.locks import Lock, LockKind, can_fix
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import ControlId, get_triggered_part
+from drivetwin.workbench.views.widgets import render_table
 
 
 def parse_lock(parameter_id: str, kind: LockKind, value: float | None, std: float | None) -> Lock:

@@ -16,7 +16,6 @@ from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import UploadField, get_triggered_part
 from drivetwin.workbench.views.sources import (
     build_file_buttons,
@@ -24,6 +23,7 @@ from drivetwin.workbench.views.sources import (
     get_source,
     register_opening,
 )
+from drivetwin.workbench.views.widgets import render_table
 
 
 def layout() -> list[Component]:

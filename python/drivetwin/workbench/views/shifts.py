@@ -31,9 +31,9 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog, SessionState
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views import zooming
-from drivetwin.workbench.views.blocks import render_table
 from drivetwin.workbench.views.fields import ControlId, Index
 from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
+from drivetwin.workbench.views.widgets import render_table
 
 
 class Use(StrEnum):

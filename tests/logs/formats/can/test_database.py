@@ -106,7 +106,7 @@ def test_what_is_no_dbc(tmp_path: Path) -> None:
 
 def test_the_built_in_messages_are_those_that_cantools_reads(tmp_path: Path) -> None:
     """A log with all messages of one frame: the same channels by the file and without it."""
-    with as_file(files("drivetwin.logs.formats.j1939") / "driveline.dbc") as dbc:
+    with as_file(files("drivetwin.logs.formats.can") / "driveline.dbc") as dbc:
         database: Any = cantools.database.load_file(dbc)
         messages = [one for one in database.messages if one.length <= 8]
         lines = [

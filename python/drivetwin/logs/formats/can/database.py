@@ -216,7 +216,7 @@ _NUMBER = re.compile(r'^BA_ "SPN" SG_ (?P<identifier>\d+) (?P<name>\w+) (?P<spn>
 @cache
 def load_driveline_messages() -> tuple[Message, ...]:
     """Load the messages of `driveline.dbc`: J1939, Intel order, unsigned, not multiplexed."""
-    text = (files("drivetwin.logs.formats.j1939") / "driveline.dbc").read_text(encoding="utf-8")
+    text = (files("drivetwin.logs.formats.can") / "driveline.dbc").read_text(encoding="utf-8")
     numbers: dict[tuple[str, str], int] = {}
     found: dict[str, list[re.Match[str]]] = {}
     names: dict[str, str] = {}

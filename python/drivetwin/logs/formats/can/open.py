@@ -22,6 +22,7 @@ from drivetwin.logs.formats.can.database import (
     parse_database,
     read_database,
 )
+from drivetwin.logs.formats.can.j1939 import match_groups
 from drivetwin.logs.formats.can.recording import BusRecording
 from drivetwin.logs.formats.can.texts import read_bus_text
 from drivetwin.logs.formats.frames import (
@@ -34,7 +35,6 @@ from drivetwin.logs.formats.frames import (
     build_frames,
     describe_left_out,
 )
-from drivetwin.logs.formats.j1939.matching import match_groups
 from drivetwin.logs.raw import Recording, subtract_origin
 
 DATA_FRAME = "CAN_DataFrame"

@@ -22,18 +22,30 @@ from drivetwin.logs.formats.can.database import (
     select_addressed_payloads,
     select_valid_payloads,
 )
-from drivetwin.logs.formats.code_texts import describe_faults
-from drivetwin.logs.formats.frames import FEW_EARLIER, MOST_EARLIER, Frames, Message, Signal
-from drivetwin.logs.formats.j1939 import torque
-from drivetwin.logs.formats.j1939.matching import GroupTable, check_codes, get_group
-from drivetwin.logs.formats.j1939.transport import (
+from drivetwin.logs.formats.can.j1939 import (
+    ACTUAL,
     ENGINE,
+    FRACTION,
+    FRICTION,
+    NET_TORQUE,
+    PERCENT_TORQUES,
+    REFERENCE,
     REPEATED,
     TRANSMISSION,
+    UNIT,
     Assembled,
+    GroupTable,
+    add_fraction,
     assemble_messages,
+    check_codes,
+    compute_net_torque,
+    convert_to_torque,
     decode_sender,
+    derive_torque_name,
+    get_group,
 )
+from drivetwin.logs.formats.code_texts import describe_faults
+from drivetwin.logs.formats.frames import FEW_EARLIER, MOST_EARLIER, Frames, Message, Signal
 from drivetwin.logs.raw import MIN_SAMPLES, RawChannel, Window
 
 
@@ -154,7 +166,7 @@ class BusRecording:
             (track, signal)
             for track in tracks
             for signal in track.message.signals
-            if signal.spn in torque.PERCENT_TORQUES
+            if signal.spn in PERCENT_TORQUES
         ]
         if not percent:
             return
@@ -163,7 +175,7 @@ class BusRecording:
             self.warnings = (*self.warnings, note)
             return
         for track, signal in percent:
-            column = track.make_column(torque.derive_torque_name(signal.name), torque.UNIT)
+            column = track.make_column(derive_torque_name(signal.name), UNIT)
             yield _Entry(
                 column, partial(self._convert_percent_torque, track, signal, (reference, note))
             )
@@ -171,11 +183,10 @@ class BusRecording:
             friction = [
                 pair
                 for pair in percent
-                if pair[1].spn == torque.FRICTION
-                and _describe_sender(pair[0]) == _describe_sender(track)
+                if pair[1].spn == FRICTION and _describe_sender(pair[0]) == _describe_sender(track)
             ]
-            if actual.spn == torque.ACTUAL and len(friction) == 1:
-                column = track.make_column(torque.NET_TORQUE, torque.UNIT)
+            if actual.spn == ACTUAL and len(friction) == 1:
+                column = track.make_column(NET_TORQUE, UNIT)
                 pairs = ((track, actual), friction[0])
                 yield _Entry(column, partial(self._compute_net_torque, pairs, (reference, note)))
 
@@ -183,15 +194,15 @@ class BusRecording:
         self, track: Track, signal: Signal, reference: tuple[float, str]
     ) -> RawChannel:
         percent = self._decode_signal(track, signal)
-        if signal.spn == torque.ACTUAL:
+        if signal.spn == ACTUAL:
             for other in track.message.signals:
-                if other.spn == torque.FRACTION:
+                if other.spn == FRACTION:
                     percent = self._add_fraction(percent, track, other)
-        return torque.convert_to_torque(percent, *reference)
+        return convert_to_torque(percent, *reference)
 
     def _add_fraction(self, percent: RawChannel, track: Track, signal: Signal) -> RawChannel:
         try:
-            return torque.add_fraction(percent, self._decode_signal(track, signal))
+            return add_fraction(percent, self._decode_signal(track, signal))
         except DamagedChannelError:  # an engine that sends whole percents only
             return percent
 
@@ -199,7 +210,7 @@ class BusRecording:
         self, pairs: tuple[tuple[Track, Signal], tuple[Track, Signal]], reference: tuple[float, str]
     ) -> RawChannel:
         actual, friction = (self._convert_percent_torque(*pair, reference) for pair in pairs)
-        return torque.compute_net_torque(actual, friction)
+        return compute_net_torque(actual, friction)
 
     def _find_reference_torque(
         self, tracks: Sequence[Track], options: BusOptions
@@ -212,7 +223,7 @@ class BusRecording:
         why = "the bus has no reference torque (EC1)"
         for track in tracks:
             for signal in track.message.signals:
-                if signal.spn != torque.REFERENCE:
+                if signal.spn != REFERENCE:
                     continue
                 try:
                     torques = self._decode_signal(track, signal).values

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Editable channel mapping: one row for each column of the file."""
+"""Forms of a session: the channel mapping by column, and the questions of a new card."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from drivetwin.authoring.card_text import format_card, refuse_faults
+from drivetwin.authoring.log_estimates import LogEstimates
+from drivetwin.authoring.log_survey import LogSurvey
+from drivetwin.authoring.question import FormEntry, Key
+from drivetwin.authoring.questions import Sources
+from drivetwin.authoring.session import Session
 from drivetwin.channels.mapping import make_spec
 from drivetwin.channels.roles import (
     EXTRA_ROLES,
@@ -24,7 +30,7 @@ from drivetwin.channels.units import (
     list_time_spellings,
     resolve_channel_unit,
 )
-from drivetwin.errors import MappingError, UnitError, Where
+from drivetwin.errors import InputError, MappingError, UnitError, Where
 from drivetwin.logs.survey import Column, Survey, draft_mapping
 
 
@@ -162,3 +168,41 @@ def _list_ignored(survey: Survey, found: Mapping[str, ChannelSpec]) -> tuple[str
     used = {spec.source for spec in found.values()}
     recognised = (one.name for one in survey.columns if one.roles or one.ignored)
     return tuple(dict.fromkeys(name for name in recognised if name not in used))
+
+
+@dataclass(eq=False)
+class CardForm:
+    """Fields of a form: the texts typed so far, and the questions that follow from them.
+
+    `file_name` is the name under which the card is written.
+    """
+
+    survey: LogSurvey
+    file_name: str = "vehicle.toml"
+    texts: Mapping[Key, str] = field(default_factory=dict)
+    entries: list[FormEntry] = field(default_factory=list)
+    _estimates: dict[object, LogEstimates] = field(default_factory=dict)
+
+    def fill_in(self, texts: Mapping[Key, str]) -> None:
+        """Take the texts of some fields, and ask the questions that follow."""
+        self.texts = {**self.texts, **texts}
+        self.entries = self._begin().fill_form(self.texts)
+
+    def format_card(self, file: str) -> str:
+        """Return the text of the card.
+
+        Raises InputError while answers are missing or refused, CardError where the answers
+        contradict each other.
+        """
+        session = self._begin()
+        open_ = [one for one in session.fill_form(self.texts) if one.fault]
+        if open_:
+            listed = "".join(f"\n  - {one.question.prompt}: {one.fault}" for one in open_)
+            count = "1 answer is" if len(open_) == 1 else f"{len(open_)} answers are"
+            raise InputError(f"{count} missing or refused:{listed}", "complete these fields")
+        text = format_card(session.answers, self.survey, session.estimates)
+        refuse_faults(text, file)
+        return text
+
+    def _begin(self) -> Session:
+        return Session({}, Sources("vehicle", self.survey), self._estimates)

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import RefusedError
-from drivetwin.workbench.uploads import find_formula, make_label, refuse_formulas, store_stream
+from drivetwin.workbench.workspace import find_formula, make_label, refuse_formulas, store_stream
 from tests.support.repeats import mark_repeats
 
 LIMIT = 1000

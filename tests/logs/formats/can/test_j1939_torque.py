@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.logs.formats.j1939.torque import add_fraction
+from drivetwin.logs.formats.can.j1939 import add_fraction
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log, read_raw
 from drivetwin.vehicle.card import load_card
