@@ -17,13 +17,11 @@ from dataclasses import replace
 
 from benchmarks.calibrate.statement import ENERGY, LOCK_BY, REQUEST, make_maneuver, make_task
 from drivetwin.calibration.calibrate import Task, calibrate
-from drivetwin.calibration.front import trace_front
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.objective import Limit, Statistic
-from drivetwin.calibration.operating_map import Grid, OperatingMap, calibrate_map
+from drivetwin.calibration.objective import CalibrationSettings, Limit, Statistic
+from drivetwin.calibration.operating_map import Grid, OperatingMap, calibrate_map, trace_front
 from drivetwin.calibration.policies.controller import build_controller_policy
-from drivetwin.calibration.settings import CalibrationSettings
 from tests.support.upshift.statement import BAR
 
 _SYSTEM = 10.0 * BAR

@@ -26,9 +26,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import TABLE, attach_listener, record_stages
 from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.calibrate import Task as CalibrationTask
-from drivetwin.calibration.front import trace_front
 from drivetwin.calibration.maneuver import OperatingPoint
-from drivetwin.calibration.operating_map import Grid, calibrate_map
+from drivetwin.calibration.operating_map import Grid, calibrate_map, trace_front
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli.identify import load_identified_card, read_shifts

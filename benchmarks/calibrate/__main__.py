@@ -43,10 +43,9 @@ from benchmarks.calibrate.statement import (
 )
 from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.objective import compute_tail_mean
+from drivetwin.calibration.objective import CalibrationSettings, compute_tail_mean
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.scenarios import Purpose, draw_scenarios
-from drivetwin.calibration.settings import CalibrationSettings
 
 TAIL = 0.9
 """Quantile beyond which the objective averages peak jerk."""

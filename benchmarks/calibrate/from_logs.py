@@ -39,11 +39,10 @@ from drivetwin.calibration.compared_shift import DrivenShift, match_profiles
 from drivetwin.calibration.learn import correct_twin, require_explained
 from drivetwin.calibration.maneuver import Profiles
 from drivetwin.calibration.metrics import Metric, Outcome
-from drivetwin.calibration.objective import Objective
+from drivetwin.calibration.objective import CalibrationSettings, Objective
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task, choose_start
 from drivetwin.errors import DrivetwinError, IdentificationError

@@ -32,9 +32,9 @@ from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Space
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import OilFriction, OilState, Spread
 from drivetwin.calibration.twin_task import build_task
 from drivetwin.errors import DrivetwinError

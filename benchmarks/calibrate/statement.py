@@ -23,13 +23,12 @@ from drivetwin.actuator.model import ActuatorModel, IdentifiedActuator
 from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.objective import CalibrationSettings, Limit, Statistic
 from drivetwin.calibration.policies.controller import build_controller_policy
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.slip import build_slip_policy
 from drivetwin.calibration.policies.table import KnotPolicy, KnotProfile, join_profiles
 from drivetwin.calibration.scenarios import Draw, MakeDriveline, scale_units
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.simulation.driveline import Driveline

@@ -24,8 +24,8 @@ from benchmarks.calibrate.true_vehicle import make_vehicle, measure_true_shift
 from drivetwin.calibration.calibrate import Assessment, calibrate
 from drivetwin.calibration.maneuver import ClosedLoop
 from drivetwin.calibration.metrics import Metric
+from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import build_task
 from drivetwin.errors import DrivetwinError
 

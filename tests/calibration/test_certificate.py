@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from drivetwin.calibration.certificate import certify, compute_promise
-from drivetwin.calibration.front import Arm, FrontPoint, select_nondominated
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.operating_map import Arm, FrontPoint, select_nondominated
 from drivetwin.calibration.scenarios import Scenarios
 from tests.support.arrays import FloatArray
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import draw_for
+from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.calibration.polish import Candidate, search_minima
 from drivetwin.calibration.scenarios import Purpose
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from tests.calibration.twins import make_exact_twin

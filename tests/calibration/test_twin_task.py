@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.objective import Limit
+from drivetwin.calibration.objective import Hardware, Limit
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.spread import OilFriction, Spread
 from drivetwin.calibration.twin_task import Request, build_task

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.cli import main
 from tests.calibration.cases import QUICK
 

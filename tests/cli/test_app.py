@@ -128,7 +128,6 @@ SOURCES = Path(__file__).parents[2] / "python" / "drivetwin"
 NO_MESSAGES = {
     "modeling/element_help.py",
     "workbench/views/page.py",
-    "workbench/views/zooming.py",
 }
 """Sources whose backticks reach no terminal: docstrings of methods, templates of JavaScript."""
 

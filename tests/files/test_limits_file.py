@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin.calibration.hardware import Hardware
 from drivetwin.calibration.metrics import METRICS, Metric
-from drivetwin.calibration.objective import Limit, Statistic, build_limit_keys
+from drivetwin.calibration.objective import Hardware, Limit, Statistic, build_limit_keys
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
 from drivetwin.files.limits_file import load_limits

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tomlkit
 
-from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.cli import main
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.files.twin_file import load_twin

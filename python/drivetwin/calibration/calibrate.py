@@ -19,7 +19,7 @@ from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.lower_bound import compute_lower_bound
 from drivetwin.calibration.maneuver import Control, Maneuver, Profiles, compute_nominal_profiles
 from drivetwin.calibration.metrics import Metric, Outcome
-from drivetwin.calibration.objective import Limit, Objective, compute_tail_mean
+from drivetwin.calibration.objective import CalibrationSettings, Limit, Objective, compute_tail_mean
 from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.polish import (
     TOLERANCE,
@@ -36,7 +36,6 @@ from drivetwin.calibration.scenarios import (
     draw_scenarios,
     draw_types,
 )
-from drivetwin.calibration.settings import CalibrationSettings
 
 _COARSE = 2e-3
 """Sampling step [s] of the search."""

@@ -27,8 +27,7 @@ from drivetwin._util.display_units import spell_unit
 from drivetwin._util.progress import notify_progress
 from drivetwin.calibration.certificate import LimitCheck
 from drivetwin.calibration.metrics import METRICS, Metric, Outcome
-from drivetwin.calibration.objective import Objective, Statistic
-from drivetwin.calibration.settings import CalibrationSettings
+from drivetwin.calibration.objective import CalibrationSettings, Objective, Statistic
 from drivetwin.errors import InfeasibleError
 
 _POOL = 6

@@ -27,7 +27,7 @@ from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.maneuver import ClosedLoop
 from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list_outputs
 from drivetwin.calibration.objective import build_limit_keys
-from drivetwin.calibration.policies.own import UserController
+from drivetwin.calibration.policies.slip import UserController
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.scenarios import Draw, MakeDriveline, Purpose, draw_scenarios
 from drivetwin.calibration.twin_task import Request, build_task, choose_point

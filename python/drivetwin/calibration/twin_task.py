@@ -17,17 +17,21 @@ from drivetwin.calibration.calibrate import (
 )
 from drivetwin.calibration.certificate import compute_quantiles
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.hardware import Hardware, add_hardware
 from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, Profiles, check_gears
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.objective import Limit, Statistic
+from drivetwin.calibration.objective import (
+    CalibrationSettings,
+    Hardware,
+    Limit,
+    Statistic,
+    add_hardware,
+)
 from drivetwin.calibration.options import USUAL_WHEEL_RADIUS, CalibrationOptions
-from drivetwin.calibration.policies.own import UserController
+from drivetwin.calibration.policies.slip import UserController
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.spread import OilFriction, OilState, Spread
 from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where

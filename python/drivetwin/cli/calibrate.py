@@ -21,18 +21,22 @@ from drivetwin._util.plain_values import format_json
 from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration, Task
 from drivetwin.calibration.calibrate import calibrate as run_calibration
-from drivetwin.calibration.front import Front, trace_front
 from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.learn import Correction
 from drivetwin.calibration.maneuver import OperatingPoint
-from drivetwin.calibration.operating_map import Grid, OperatingMap, calibrate_map
+from drivetwin.calibration.objective import CalibrationSettings
+from drivetwin.calibration.operating_map import (
+    Front,
+    Grid,
+    OperatingMap,
+    calibrate_map,
+    trace_front,
+)
 from drivetwin.calibration.options import CalibrationOptions
-from drivetwin.calibration.policies import own
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.policies.own import UserController
+from drivetwin.calibration.policies.slip import BENCH, BENCH_DEFINES, HEADER, UserController
 from drivetwin.calibration.polish import require_limits
-from drivetwin.calibration.settings import CalibrationSettings
 from drivetwin.calibration.twin_task import Request, build_task, choose_start
 from drivetwin.cli.export import parse_gears
 from drivetwin.cli.input_files import read_twin_log
@@ -230,12 +234,12 @@ def compile_controller(path: Path, *, bench: bool = False) -> Iterator[UserContr
     """
     content = load_controller_file(path)
     sources = [one.resolve() for one in content.list_sources(path)]
-    folders = [own.HEADER.parent, *((path.parent / one).resolve() for one in content.include)]
+    folders = [HEADER.parent, *((path.parent / one).resolve() for one in content.include)]
     where = Where(file=", ".join(str(one) for one in content.list_sources(path)))
     with TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # Windows keeps loaded libraries
         platform = detect_platform()
         library = Path(folder) / f"{sources[0].stem}{platform.suffix if platform else '.so'}"
-        files, more = ([own.BENCH], own.BENCH_DEFINES) if bench else ([], ())
+        files, more = ([BENCH], BENCH_DEFINES) if bench else ([], ())
         with show_step(f"compiling {sources[0].name}"):
             try:
                 message = compile_library(

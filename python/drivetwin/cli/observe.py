@@ -23,7 +23,7 @@ from drivetwin.observer.linear_model import Observation
 from drivetwin.observer.smooth import estimate_torques
 from drivetwin.report.blocks import Outcome, Tone, make_notes
 from drivetwin.report.html import save_page
-from drivetwin.report.observer import build_observer_page, build_torque_blocks
+from drivetwin.report.whole_drive import build_observer_page, build_torque_blocks
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.shifts.shift import Shift, compute_exclusive_masks
 

@@ -13,10 +13,9 @@ from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.toml import parse_toml
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitState
-from drivetwin.calibration.front import Arm, Front
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import build_limit_keys
-from drivetwin.calibration.operating_map import MapPoint, OperatingMap
+from drivetwin.calibration.operating_map import Arm, Front, MapPoint, OperatingMap
 from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policy import Policy
 from drivetwin.calibration.spread import Spread

@@ -14,9 +14,8 @@ from pydantic import Field, FiniteFloat
 from scipy.constants import zero_Celsius
 
 from drivetwin._util.toml import Fault, raise_faults, read_toml, validate_schema
-from drivetwin.calibration.hardware import Hardware
-from drivetwin.calibration.objective import Limit, build_limit_keys
-from drivetwin.calibration.policies.own import UserController
+from drivetwin.calibration.objective import Hardware, Limit, build_limit_keys
+from drivetwin.calibration.policies.slip import UserController
 from drivetwin.calibration.policy import PolicyParameter
 from drivetwin.calibration.spread import FRICTION_SLOPE, FRICTION_SLOPE_STD, OilFriction, Spread
 from drivetwin.calibration.trial import Scenario, build_assertion_keys

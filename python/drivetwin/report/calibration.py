@@ -9,11 +9,10 @@ from drivetwin._util.display_units import RPM, Display, get_display_unit, spell_
 from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import TYPES, UNITS, LimitCheck, LimitState
-from drivetwin.calibration.front import Front
-from drivetwin.calibration.hardware import describe_unusual
 from drivetwin.calibration.maneuver import ClosedLoop, OperatingPoint
 from drivetwin.calibration.metrics import METRICS, Metric
-from drivetwin.calibration.operating_map import MapPoint, OperatingMap
+from drivetwin.calibration.objective import describe_unusual
+from drivetwin.calibration.operating_map import Front, MapPoint, OperatingMap
 from drivetwin.findings import Finding
 from drivetwin.report.blocks import (
     Block,

@@ -15,8 +15,7 @@ from drivetwin.calibration.policies.controller import (
     build_inertia_first_policy,
 )
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.policies.own import UserController, build_own_policy
-from drivetwin.calibration.policies.slip import build_slip_policy
+from drivetwin.calibration.policies.slip import UserController, build_own_policy, build_slip_policy
 from drivetwin.calibration.policy import Policy, PolicyParameter, Space
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import Signal

@@ -22,7 +22,6 @@ from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened, Preview
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views import zooming
 from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import Index
 from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
@@ -57,8 +56,8 @@ def register(page: ui.Page) -> None:
     """Register the callbacks that show and correct the mapping."""
     _register_preview(page)
     register_log_choice(page, Place.CHANNELS)
-    zooming.register(page, "preview-plot", _get_preview_panels)
-    zooming.register(
+    ui.register_zoom(page, "preview-plot", _get_preview_panels)
+    ui.register_zoom(
         page, "channels-plot", lambda session: build_log_panels(session.work.require_log())
     )
 

@@ -20,7 +20,7 @@ from drivetwin.vehicle.locks import can_fix
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState
-from drivetwin.workbench.views import locks, zooming
+from drivetwin.workbench.views import locks
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
@@ -62,7 +62,7 @@ def register(page: ui.Page) -> None:
     _register_sliders(page)
     locks.register(page)
     register_log_choice(page, Place.MODEL)
-    zooming.register(page, "model-plot", _get_model_panels)
+    ui.register_zoom(page, "model-plot", _get_model_panels)
 
 
 def _get_model_panels(session: Session) -> list[Panel]:

@@ -30,7 +30,6 @@ from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog, SessionState
 from drivetwin.workbench.views import widgets as ui
-from drivetwin.workbench.views import zooming
 from drivetwin.workbench.views.fields import ControlId, Index
 from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
 from drivetwin.workbench.views.widgets import render_table
@@ -61,7 +60,7 @@ def layout() -> list[Component]:
 def register(page: ui.Page) -> None:
     """Register the callbacks by which boundaries are moved and shifts held out."""
     register_log_choice(page, Place.SHIFTS)
-    zooming.register(page, "phases-plot", _get_phase_panels)
+    ui.register_zoom(page, "phases-plot", _get_phase_panels)
     _register_uses(page)
     _register_figure(page)
     _register_fields(page)

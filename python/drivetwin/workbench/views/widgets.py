@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The few things that views are made of: labelled controls, blocks of results, messages, topics.
+"""The few things that views are made of: controls, blocks of results, messages, topics, zoom.
 
 Selects are the browser's own: they work with keyboard and screen reader as they are. The script of
 the page hands their value to the property `data-value`.
@@ -16,7 +16,7 @@ from itertools import repeat
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
-from dash import Dash, Output, State, dcc, html, no_update, set_props
+from dash import Dash, Input, Output, Patch, State, dcc, html, no_update, set_props
 from dash.dependencies import DashDependency
 from dash.development.base_component import Component
 
@@ -34,11 +34,14 @@ from drivetwin.report.blocks import (
     VerdictBlock,
 )
 from drivetwin.report.figure import Figure
+from drivetwin.report.figures.stack import Panel, compute_y_ranges
 from drivetwin.workbench.page_words import replace_options
+from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views.fields import check_fields
 from drivetwin.workbench.workspace import LIMITS
+from drivetwin.workbench.zoom import collect_curves, parse_view
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -332,3 +335,25 @@ def _render_cell(cell: Cell, kind: type[html.Td] | type[html.Th], **options: Any
     content += [html.Small(text) for text in (cell.note, cell.remark) if text]
     name = "number" if cell.number else "text"
     return kind(content, className=f"{name} secondary" if cell.secondary else name, **options)
+
+
+def register_zoom(page: Page, plot: str, get_panels: Callable[[Session], Sequence[Panel]]) -> None:
+    """Draw the figure `plot` anew where it is zoomed; `get_panels` returns its panels."""
+
+    @page.callback(Output(plot, "figure", allow_duplicate=True), Input(plot, "relayoutData"))
+    def follow(session: Session, change: dict[str, Any] | None) -> Any:
+        """Send the samples in view."""
+        view = parse_view(change or {})
+        if view is None:
+            return no_update
+        if session.set_view(view):
+            notify_topic(Topic.PHASES)
+        panels = get_panels(session)
+        patch = Patch()
+        for place, curve in collect_curves(panels, view).items():
+            patch["data"][place]["x"] = curve["x"]
+            patch["data"][place]["y"] = curve["y"]
+        patch["layout"]["xaxis"]["range"] = list(view)
+        for axis, ends in compute_y_ranges(panels, view).items():
+            patch["layout"][axis]["range"] = list(ends)
+        return patch

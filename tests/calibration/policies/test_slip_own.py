@@ -13,7 +13,7 @@ import pytest
 from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.policies.kind import PolicyKind
-from drivetwin.calibration.policies.own import HEADER
+from drivetwin.calibration.policies.slip import HEADER
 from drivetwin.errors import ControllerError
 from drivetwin.export.compiler import compile_library
 from drivetwin.simulation.shift_control import ExternalController, ShiftController
