@@ -98,7 +98,6 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenario_file import load_scenario
-    from drivetwin.estimation.result.method import Method
     from drivetwin.workbench.sessions import Sessions
     from drivetwin.workbench.workspace import Folder
 
@@ -108,7 +107,7 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
         sessions = Sessions(Folder.from_path(folder))
         session = sessions.get(sessions.create())
         session.open(session.get_folder_source(log.name), session.get_folder_source(card.name))
-        session.identify([Method.PAPER, Method.LIKELIHOOD], is_quick=True)
+        session.identify(is_quick=True)
         while session.job is not None:
             session.collect_job_results()
             time.sleep(0.05)

@@ -49,7 +49,7 @@ from drivetwin.validation.validated_model import (
 )
 from drivetwin.vehicle.spec import SensorTolerance
 from drivetwin.vehicle.vehicle_card import VehicleCard
-from drivetwin.workbench.identifying import Task, identify_all
+from drivetwin.workbench.identifying import Task, identify_logs
 
 T = TypeVar("T")
 
@@ -171,8 +171,8 @@ def run_joint(folder: Path) -> Iterator[tuple[str, Timeline]]:
     page = partial(lambda made: render_page(build_joint_page(made.found, made.fitted)), joined[0])
     yield "report of several logs", record_timeline(page)
     bench = make_bench(folder, OPEN)
-    task = Task([bench.source], bench.card, tuple(Method))
-    yield "workbench, all methods", record_timeline(lambda: identify_all(lambda _: None, task))
+    task = Task([bench.source], bench.card)
+    yield "workbench", record_timeline(lambda: identify_logs(lambda _: None, task))
 
 
 def run_calibrations(folder: Path) -> Iterator[tuple[str, Timeline]]:

@@ -22,7 +22,7 @@ NAMES = ("chromium", "chromium-browser", "google-chrome")
 PATIENCE = 300_000
 """Time [ms] that a step may take on a busy machine."""
 STEPS = ("log", "channels", "card", "shifts", "identify", "model", "export")
-VIEWS = (*STEPS, "compare", "workspace")
+VIEWS = (*STEPS, "workspace")
 INERTIA = 2
 """Place of the line that starts the inertia phase among those that can be dragged."""
 

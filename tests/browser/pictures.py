@@ -86,7 +86,7 @@ def _write_card(page: Page) -> None:
     page.get_by_label("P0 of B2").scroll_into_view_if_needed()
     _save(page, "3-card")
     page.get_by_label("File name").fill(CARD)
-    page.click("#write-card")
+    page.click("#write-question")
     expect(page.locator("#message")).to_contain_text(f"{CARD} is written and open")
 
 

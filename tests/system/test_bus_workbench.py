@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from drivetwin import Method
 from drivetwin.cli import main
 from drivetwin.errors import InputError
 from drivetwin.workbench.sessions import Sessions
@@ -37,7 +36,7 @@ def identified(folder: Path) -> Iterator[Any]:
         one.add_log(one.get_folder_source(name))
     one.hold_out([frozenset(), frozenset(), frozenset({0})])
     assert _list_states(one.work)["IDENTIFY"] == "NEXT"
-    one.identify([Method("likelihood")])
+    one.identify()
     finish(one)
     yield one
     sessions.close()

@@ -13,7 +13,6 @@ import pytest
 from flask.testing import FlaskClient
 
 from drivetwin.cli import main
-from drivetwin.estimation.result.method import Method
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import build_server
 from drivetwin.workbench.sessions import Sessions
@@ -42,11 +41,11 @@ def session(place: Path) -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def identified(place: Path) -> Iterator[Any]:
-    """A session that has identified the log by the paper's method and a quick likelihood."""
+    """A session that has identified the log by one model."""
     sessions = Sessions(Folder.from_path(place))
     one = sessions.get(sessions.create())
     one.open(one.get_folder_source(LOG), one.get_folder_source(CARD))
-    one.identify([Method.PAPER, Method.LIKELIHOOD], is_quick=True)
+    one.identify(is_quick=True)
     finish(one)
     yield one
     sessions.close()

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from drivetwin import Method
 from drivetwin.errors import InputError, UnitError
 from drivetwin.vehicle.locks import Lock, LockKind
 from drivetwin.workbench.forms import Entry, list_rows
@@ -32,9 +31,9 @@ def test_locks_and_phases_reach_the_identification(session: Any) -> None:
     time = shift.torque_phase[0] - 0.004
     session.move_boundaries(0, {Boundary.TORQUE: time})
     session.set_lock("k_o", Lock(LockKind.FIXED, 1.75e5))
-    session.identify([Method.LIKELIHOOD], is_quick=True)
+    session.identify(is_quick=True)
     with pytest.raises(InputError, match="running"):
-        session.identify([Method.LIKELIHOOD], is_quick=True)
+        session.identify(is_quick=True)
     finish(session)
     outcome = session.work.require_outcome()
     assert outcome.twin.parameters["k_o"].value == pytest.approx(1.75e5)
@@ -44,13 +43,13 @@ def test_locks_and_phases_reach_the_identification(session: Any) -> None:
 
 def test_why_an_identification_ended_early_is_kept_until_the_next(session: Any) -> None:
     _open(session)
-    session.identify([Method.LIKELIHOOD], is_quick=True)
+    session.identify(is_quick=True)
     assert session.job is not None
     session.job.process.kill()
     with pytest.raises(InputError, match="was killed by") as ended:
         finish(session)
     assert session.work.ended == str(ended.value)
-    session.identify([Method.PAPER])
+    session.identify(is_quick=True)
     assert not session.work.ended
     session.cancel()
 
@@ -115,7 +114,7 @@ def test_a_recognised_column_can_be_not_used_and_used_again(
 
 def test_what_cannot_be_read_lets_the_identification_run_on(session: Any) -> None:
     _open(session)
-    session.identify([Method.PAPER])
+    session.identify(is_quick=True)
     with pytest.raises(InputError):
         session.open(session.get_folder_source(CARD), session.get_folder_source(LOG))
     with pytest.raises(InputError):
@@ -125,15 +124,15 @@ def test_what_cannot_be_read_lets_the_identification_run_on(session: Any) -> Non
         session.open_log(session.get_uploaded(key))
     assert key not in str(caught.value)
     finish(session)
-    assert list(session.work.results) == [Method.PAPER]
-    session.identify([Method.LIKELIHOOD])
+    assert session.work.result is not None
+    session.identify()
     _open(session)
     assert session.job is None
 
 
 def test_nothing_is_done_before_a_log_is_open(session: Any) -> None:
     for action in (
-        lambda: session.identify([Method.PAPER]),
+        session.identify,
         lambda: session.correct_mapping([]),
         lambda: session.move_boundaries(0, {}),
         session.get_simulation,
@@ -202,11 +201,8 @@ def several(session: Any, place: Path) -> Any:
 
 
 def test_a_held_out_log_is_predicted_and_has_no_twin(several: Any) -> None:
-    several.identify([Method.PAPER])
-    finish(several)
-    assert "one log at a time" in several.work.refusals[Method.PAPER]
     several.hold_out([frozenset(), frozenset({0})])
-    several.identify([Method.PAPER])
+    several.identify(is_quick=True)
     finish(several)
     outcome = several.work.require_outcome()
     assert list(outcome.twins) == [LOG]

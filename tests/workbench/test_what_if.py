@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin import Method
 from drivetwin.workbench.what_if import simulate_identified
 
 
 @pytest.fixture
 def moved(identified: Any) -> Iterator[Any]:
     """A session whose sliders go back afterwards."""
-    identified.choose_method(Method.LIKELIHOOD)
+    identified.reset_sliders()
     yield identified
-    identified.choose_method(Method.LIKELIHOOD)
+    identified.reset_sliders()
 
 
 def test_at_rest_the_run_is_that_of_the_identification(moved: Any) -> None:

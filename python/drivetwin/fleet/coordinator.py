@@ -15,7 +15,7 @@ from time import monotonic
 
 from drivetwin.errors import StoreError, Where
 from drivetwin.fleet.options import FleetOptions
-from drivetwin.fleet.pool import LocalPool, Pool, count_usable_cores
+from drivetwin.fleet.pool import DaskPool, LocalPool, Pool, count_usable_cores
 from drivetwin.fleet.rules import RulesFile, Sources
 from drivetwin.fleet.scan import Scan, Scanned, make_settings_document
 from drivetwin.fleet.store import FileRow, Store
@@ -282,7 +282,5 @@ def run_fleet(request: FleetRun, tell: Listener = lambda _: None) -> Summary:
 
 def _make_pool(request: FleetRun, tell: Listener) -> Pool:
     if request.scheduler is not None:
-        from drivetwin.fleet.pool import DaskPool
-
         return DaskPool(request.scheduler, request.worker, tell)
     return LocalPool(request.workers or count_usable_cores(), request.worker)

@@ -18,7 +18,7 @@ from concurrent.futures import CancelledError
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from time import monotonic, sleep
-from typing import IO, Any, Protocol
+from typing import IO, Any
 from uuid import uuid4
 
 from drivetwin._util.child_process import BY_ITSELF, GRACE, describe_end, end_process
@@ -208,27 +208,6 @@ def _read_resident_memory(pid: int) -> int:
 
 AHEAD = 2
 """Tasks given out for each worker: one at work, one at hand. More would only fill memory."""
-
-
-class Pool(Protocol):
-    """Takes tasks and answers them in any order."""
-
-    @property
-    def capacity(self) -> int:
-        """Maximum number of tasks in flight."""
-
-    @property
-    def address(self) -> str | None:
-        """Address of the pool's dashboard, if any."""
-
-    def submit(self, task: Task) -> None:
-        """Give out a task."""
-
-    def next(self, timeout: float) -> tuple[Task, Reply] | None:
-        """Return the next reply, or None after `timeout` [s]."""
-
-    def close(self) -> None:
-        """End all work at once."""
 
 
 def count_usable_cores() -> int:
@@ -432,3 +411,7 @@ def _get_reply(done: Any) -> Reply:
     except (OSError, TimeoutError, CancelledError):
         return WorkerLost("the scheduler went away with the answer", blame=False)
     return WorkerLost("the cluster took the task back", blame=False)
+
+
+Pool = LocalPool | DaskPool
+"""Takes tasks and answers them in any order; its `capacity` tasks may be in flight."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The identification as a job: one method after the other, each result reported when complete."""
+"""Phases set by hand, and the identification as a job."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.experiment_design import rank_for_weak
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.mechanism import quick
-from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.findings import Code, report
 from drivetwin.report.bus import BusOutcome, identify_vehicle
 from drivetwin.report.figure import ACCENT, MUTED, Figure
@@ -25,7 +25,7 @@ from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import Source, identify_together
 from drivetwin.vehicle.card import RatioCard
 from drivetwin.vehicle.vehicle_card import VehicleCard
-from drivetwin.workbench.jobs import Emit, to_fault
+from drivetwin.workbench.jobs import Emit
 from drivetwin.workbench.zoom import parse_number
 
 LEAST_PHASE = 5e-3
@@ -164,10 +164,7 @@ def parse_drag(figure: Figure, change: Mapping[str, object]) -> dict[Boundary, f
     return found
 
 
-_STAGES = TimedStages("methods", tuple(one.value for one in Method))
-_STEPS = {
-    one: TimedStages(f"{one.value} method", ("identification", "experiments")) for one in Method
-}
+_STAGES = TimedStages("identification of a session", ("identification", "experiments"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,19 +176,17 @@ class Task:
 
     sources: Sequence[Source]
     card: VehicleCard
-    methods: Sequence[Method]
     is_quick: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of one method, with a twin for each fitted log by its name.
+    """Result of an identification, with a twin for each fitted log by its name.
 
     `found` holds the validation; it is None if the twins come from a saved workspace, because the
     evidence is not saved.
     """
 
-    method: Method
     twins: Mapping[str, Twin]
     found: Identification | None = None
 
@@ -201,36 +196,12 @@ class Outcome:
         return next(iter(self.twins.values()))
 
 
-@dataclass(frozen=True)
-class Refusal:
-    """Reason why one method failed, and the remedy."""
-
-    method: Method
-    text: str
-
-
-def identify_all(emit: Emit, task: Task) -> None:
-    """Run every method of the task and validate its twin; emits an Outcome or Refusal for each.
-
-    Whatever ends one method, a fault of the program included, leaves the others their turn.
-    """
-    skipped = {one.value: 0 for one in Method if one not in task.methods}
-    stages = replace(_STAGES, counts=skipped)
-    for method in task.methods:
-        with stages.enter(method.value, f"{method.value} method"):
-            emit(_run_method(task, method))
-
-
-def _run_method(task: Task, method: Method) -> Outcome | Refusal:
-    """Run one method; return its outcome, or the reason of its failure."""
-    try:
-        with _STEPS[method].enter("identification"), quick(task.is_quick):
-            made = identify_together(task.sources, task.card, method)
-        with _STEPS[method].enter("experiments", "comparing experiments"):
-            return Outcome(method, made.twins, rank_for_weak(made.found))
-    except Exception as error:
-        fault = to_fault(error)
-        return Refusal(method, f"{fault.what} -> {fault.remedy}")
+def identify_logs(emit: Emit, task: Task) -> None:
+    """Identify by the default method and validate the twins; emits an Outcome."""
+    with _STAGES.enter("identification"), quick(task.is_quick):
+        made = identify_together(task.sources, task.card, DEFAULT_METHOD)
+    with _STAGES.enter("experiments", "comparing experiments"):
+        emit(Outcome(made.twins, rank_for_weak(made.found)))
 
 
 @dataclass(frozen=True, eq=False)

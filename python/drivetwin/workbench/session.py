@@ -20,14 +20,13 @@ from drivetwin.dyno.dyno import run
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import format_card, format_log, load_scenario
 from drivetwin.errors import InputError, RefusedError, Where
-from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.report.figure import Figure
 from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, what_if, workspace
 from drivetwin.workbench.forms import CardForm, Corrections, Entry, apply_entries
-from drivetwin.workbench.identifying import Boundary, Task, identify_all, identify_bus_logs
+from drivetwin.workbench.identifying import Boundary, Task, identify_bus_logs, identify_logs
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
 from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
 from drivetwin.workbench.workspace import Folder
@@ -193,7 +192,7 @@ class Session:
                 raise InputError("no card is begun", "press Begin a card from the log first")
             path = self.folder.make_new_path(name, ".toml")
             self.form.file_name = path.name
-            self.form.fill_in(texts)
+            self.form.fill_in({key: text for key, text in texts.items() if text})
             return self._write_text(path, self.form.format_card(path.name), can_replace)
 
     def write_edited_card(
@@ -234,10 +233,9 @@ class Session:
         with self.lock:
             self.work = self.work.set_lock(parameter_id, lock)
 
-    def identify(self, methods: Sequence[Method], *, is_quick: bool = False) -> None:
-        """Start the identification in a separate process; bus logs have one method.
+    def identify(self, *, is_quick: bool = False) -> None:
+        """Start the identification in a separate process; with `is_quick` of one model alone.
 
-        With `is_quick` one model is fitted, as in `quick`.
         Raises InputError on failure.
         """
         with self.lock:
@@ -249,9 +247,9 @@ class Session:
                 self._set(work.drop_results())
                 self.job = jobs.start(identify_bus_logs, bus)
                 return
-            task = Task(work.build_sources(), work.apply_locks_to_card(), tuple(methods), is_quick)
+            task = Task(work.build_sources(), work.apply_locks_to_card(), is_quick)
             self._set(work.drop_results())
-            self.job = jobs.start(identify_all, task)
+            self.job = jobs.start(identify_logs, task)
 
     def collect_job_results(self) -> bool:
         """Take in what the job has found; True where something came or it ended."""
@@ -284,12 +282,10 @@ class Session:
                 raise InputError("there is no such shift", "choose one that is listed")
             self._set(replace(self.work, shift=index, changes={}))
 
-    def choose_method(self, method: Method) -> None:
-        """Select the result of another method. Raises InputError if it has no result."""
+    def reset_sliders(self) -> None:
+        """Set all sliders to the identified values."""
         with self.lock:
-            if method not in self.work.results:
-                raise InputError("there is no such result", "choose one that is listed")
-            self._set(replace(self.work, method=method, changes={}))
+            self._set(replace(self.work, changes={}))
 
     def set_view(self, view: View) -> bool:
         """Note the time window that was zoomed to.

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
-from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.bus import BusOutcome
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
@@ -18,7 +17,7 @@ from drivetwin.validation.validated_model import Source as FitSource
 from drivetwin.vehicle.card import RatioCard, VehicleCard
 from drivetwin.vehicle.locks import Lock, apply_locks, check_lock, get_card_lock
 from drivetwin.workbench.forms import Corrections
-from drivetwin.workbench.identifying import Boundary, BusTask, Outcome, Refusal, move_boundaries
+from drivetwin.workbench.identifying import Boundary, BusTask, Outcome, move_boundaries
 from drivetwin.workbench.sandboxed_parse import Opened
 
 MOST_LOGS = 6
@@ -88,22 +87,20 @@ class OpenLog:
 class SessionState:
     """The state of a session.
 
-    `at` selects one of the `logs`: the views show its channels, phases and simulation. `method` and
-    `shift` select the result and the shift of the sliders; `changes` are the sliders (SI) that
-    differ from the identified values. `ended` is the reason why the last identification ended
-    before its last method; empty if it was completed. `bus` is the result of bus logs. `has_viewed`
-    and `has_exported` state whether the result was looked at in the step Model, and exported.
+    `at` selects one of the `logs`: the views show its channels, phases and simulation. `shift`
+    selects the shift of the sliders; `changes` are the sliders (SI) that differ from the identified
+    values. `ended` is the reason why the last identification failed; empty if it was completed.
+    `bus` is the result of bus logs. `has_viewed` and `has_exported` state whether the result was
+    looked at in the step Model, and exported.
     """
 
     logs: tuple[OpenLog, ...] = ()
     at: int = 0
     card: Source | None = None
     locks: Mapping[str, Lock] = field(default_factory=dict)
-    results: Mapping[Method, Outcome] = field(default_factory=dict)
-    refusals: Mapping[Method, str] = field(default_factory=dict)
+    result: Outcome | None = None
     ended: str = ""
     bus: BusOutcome | None = None
-    method: Method | None = None
     shift: int = 0
     changes: Mapping[str, float] = field(default_factory=dict)
     has_viewed: bool = False
@@ -133,11 +130,6 @@ class SessionState:
     def ratios(self) -> RatioCard | None:
         """The card of the ratios alone that is open; None without one."""
         return self.logs[self.at].opened.ratios if self.logs else None
-
-    @property
-    def verdict_outcome(self) -> Outcome | None:
-        """Result of the default method, which alone gives a verdict; None before it."""
-        return self.results.get(DEFAULT_METHOD)
 
     def set_log(self, fresh: OpenLog) -> SessionState:
         """Replace the selected log after it was read again; results no longer hold."""
@@ -183,18 +175,15 @@ class SessionState:
     def drop_results(self) -> SessionState:
         """Before an identification."""
         return replace(
-            self, results={}, refusals={}, ended="", bus=None, method=None, changes={},
+            self, result=None, ended="", bus=None, changes={},
             has_viewed=False, has_exported=False,
         )  # fmt: skip
 
-    def add_result(self, result: Outcome | Refusal | BusOutcome) -> SessionState:
-        """With what one method found, which is shown from now on."""
+    def add_result(self, result: Outcome | BusOutcome) -> SessionState:
+        """With the result of an identification."""
         if isinstance(result, BusOutcome):
             return replace(self, bus=result)
-        if isinstance(result, Refusal):
-            return replace(self, refusals={**self.refusals, result.method: result.text})
-        results = {**self.results, result.method: result}
-        return replace(self, results=results, method=result.method, changes={})
+        return replace(self, result=result, changes={})
 
     def get_lock(self, parameter_id: str) -> Lock:
         """The lock of a parameter: as set, else as on the card."""
@@ -274,9 +263,9 @@ class SessionState:
                 "bus logs give quantities, but no model",
                 "download report and result; a model needs a vehicle card and an output torque",
             )
-        if self.method is None:
+        if self.result is None:
             raise InputError("nothing is identified yet", "press Identify in the step Identify")
-        return self.results[self.method]
+        return self.result
 
     def require_twin(self) -> Twin:
         """The twin of the selected log; raises InputError before an identification."""

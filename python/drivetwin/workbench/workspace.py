@@ -25,7 +25,6 @@ from drivetwin._util.toml import FromTable, StrictModel, format_key_path
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where
-from drivetwin.estimation.result.method import Method
 from drivetwin.files.twin_file import TwinFile, build_twin_file, restore_twin
 from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.vehicle.locks import Lock
@@ -261,17 +260,16 @@ class LogEntry(StrictModel):
 
 
 class WorkspaceFile(StrictModel):
-    """The whole file. `twins` go by method and name of the log, `sliders` (SI) by parameter id."""
+    """The whole file. `twins` go by the name of the log, `sliders` (SI) by parameter id."""
 
     format: Literal["drivetwin workspace"] = "drivetwin workspace"
-    version: Literal[2] = 2
+    version: Literal[3] = 3
     program: str
     logs: list[LogEntry] = Field(min_length=1, max_length=MOST_LOGS)
     card: FileEntry
     log: int = Field(default=0, ge=0)
     locks: dict[str, Annotated[Lock, FromTable]] = Field(default_factory=dict)
-    twins: dict[Method, dict[str, TwinFile]] = Field(default_factory=dict)
-    method: Method | None = None
+    twins: dict[str, TwinFile] = Field(default_factory=dict)
     shift: int = Field(default=0, ge=0)
     sliders: dict[str, float] = Field(default_factory=dict)
 
@@ -296,17 +294,14 @@ def save_workspace(work: SessionState, path: Path, folder: Folder) -> None:
             "a file of this name exists and is no workspace", "choose another name",
             Where(file=path.name),
         )  # fmt: skip
+    twins = {} if work.result is None else work.result.twins
     content = WorkspaceFile(
         program=get_program_version(),
         logs=[_make_log_entry(one, path.parent, folder) for one in work.logs],
         card=_make_file_entry(work.card, path.parent, folder),
         log=work.at,
         locks=dict(work.locks),
-        twins={
-            method: {name: build_twin_file(twin) for name, twin in one.twins.items()}
-            for method, one in work.results.items()
-        },
-        method=work.method,
+        twins={name: build_twin_file(twin) for name, twin in twins.items()},
         shift=work.shift,
         sliders=dict(work.changes),
     )
@@ -353,15 +348,12 @@ def restore_workspace(content: WorkspaceFile, work: SessionState) -> SessionStat
     work = work.hold_out([frozenset(entry.held) for entry in content.logs])
     for name, lock in content.locks.items():
         work = work.set_lock(name, lock)
-    results = {
-        method: Outcome(method, {name: restore_twin(twin) for name, twin in twins.items()})
-        for method, twins in content.twins.items()
-        if twins
-    }
-    work = replace(work.select_log(content.log), results=results)
-    if content.method in results and content.shift < len(work.shifts):
-        changes = dict(content.sliders)
-        work = replace(work, method=content.method, shift=content.shift, changes=changes)
+    work = work.select_log(content.log)
+    if content.twins:
+        twins = {name: restore_twin(twin) for name, twin in content.twins.items()}
+        work = work.add_result(Outcome(twins))
+        if content.shift < len(work.shifts):
+            work = replace(work, shift=content.shift, changes=dict(content.sliders))
     return work
 
 

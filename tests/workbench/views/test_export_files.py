@@ -60,10 +60,10 @@ def test_own_files_are_read_back(identified: Any, session: Any, tmp_path: Path) 
 
 def test_a_twin_from_a_workspace_has_no_report(identified: Any, tmp_path: Path) -> None:
     work = identified.work
-    bare = {method: replace(one, found=None) for method, one in work.results.items()}
+    bare = replace(work.require_outcome(), found=None)
     with pytest.raises(InputError, match="identify again"):
-        make_product(replace(work, results=bare), Record.REPORT, tmp_path)
-    assert make_product(replace(work, results=bare), Record.TWIN, tmp_path).content
+        make_product(replace(work, result=bare), Record.REPORT, tmp_path)
+    assert make_product(replace(work, result=bare), Record.TWIN, tmp_path).content
 
 
 def test_signals_are_measured_and_simulated_with_the_sliders(

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from drivetwin import Method
 from drivetwin.workbench.views.stepper import assess_steps
 from tests.workbench.conftest import CARD, LOG
 
@@ -31,10 +30,8 @@ def test_log_and_card_lead_to_the_identification(session: Any) -> None:
     assert _assess(session.work)[1] == [*["DONE"] * 4, "NEXT", "BLOCKED", "BLOCKED"]
 
 
-def test_only_the_default_method_completes_the_identification(identified: Any) -> None:
-    best = identified.work.require_outcome()
-    paper = identified.work.results[Method.PAPER]
-    work = replace(identified.work, results={Method.PAPER: paper}, method=Method.PAPER)
+def test_the_verdict_completes_the_identification(identified: Any) -> None:
+    best, work = identified.work.require_outcome(), identified.work.drop_results()
     assert _assess(work)[0]["identify"].status.name == "NEXT"
     for status in type(best.found.status):
         found = replace(best.found, status=status)
@@ -54,7 +51,5 @@ def test_model_and_export_are_done_when_they_were_used(identified: Any, used: bo
     work = replace(identified.work, has_viewed=used, has_exported=used)
     states, _ = _assess(work)
     assert {states[name].status.name == "DONE" for name in ("model", "export")} == {used}
-    paper = replace(work.results[Method.PAPER], twins={})
-    results = {**work.results, Method.PAPER: paper}
-    states, _ = _assess(replace(work, results=results, method=Method.PAPER))
+    states, _ = _assess(replace(work, result=replace(work.require_outcome(), twins={})))
     assert ("was not fitted" in states["model"].text) == used

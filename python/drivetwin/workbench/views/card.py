@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 from dash import ALL, Input, Output, State, ctx, dcc, html, no_update
 from dash.development.base_component import Component
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from drivetwin.authoring.card_text import EntryPath, format_path, list_numbers
 from drivetwin.authoring.question import FormEntry, Key
@@ -25,6 +25,7 @@ from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
+from drivetwin.workbench.views.fields import ControlId
 from drivetwin.workbench.views.sources import (
     build_file_buttons,
     format_source,
@@ -34,12 +35,6 @@ from drivetwin.workbench.views.widgets import render_table
 
 _KEY = TypeAdapter(list[str | int])
 _EXISTING = {"keep": "keep it", "replace": "replace it"}
-
-
-class QuestionId(BaseModel, strict=True):
-    """Id of a field: the key of its question as a JSON list."""
-
-    question: str
 
 
 def _build_form_start() -> list[Component]:
@@ -52,9 +47,8 @@ def _build_form_start() -> list[Component]:
 
 
 def _register_form(page: ui.Page) -> None:
-    """Register the begin of a form, its fields, and the writing of the card."""
+    """Register the begin of a form, and its fields."""
     _register_fields(page)
-    _register_writing(page)
 
     @page.callback(Input("begin-card", "n_clicks"), busy="begin-card")
     def begin(session: Session, _: object) -> None:
@@ -66,57 +60,60 @@ def _register_form(page: ui.Page) -> None:
         )
 
 
-def _register_writing(page: ui.Page) -> None:
+def _register_writing(page: ui.Page, part: str, write: Callable[..., Source]) -> None:
+    """Register the button that writes a card of the fields of a `part`, and opens it."""
+    fields = {"part": part, "id": ALL}
+
     @page.callback(
-        Input("write-card", "n_clicks"),
-        State("name-card", "value"),
-        State("replace-card", "data-value"),
-        State({"question": ALL}, "value"),
-        State({"question": ALL}, "id"),
-        busy="write-card",
+        Input(f"write-{part}", "n_clicks"),
+        State(f"name-{part}", "value"),
+        State(f"replace-{part}", "data-value"),
+        State(fields, "value"),
+        State(fields, "id"),
+        busy=f"write-{part}",
     )
-    def write(
+    def write_card(
         session: Session,
         clicks: int | None,
         name: str | None,
         existing: Literal["keep", "replace"],
         values: Sequence[str | None],
-        ids: Sequence[QuestionId],
+        ids: Sequence[ControlId],
     ) -> None:
         """Write the card into the folder and open it."""
-        if not clicks:
-            return
-        typed = collect_texts(values, [one.question for one in ids])
-        texts = {key: text for key, text in typed.items() if text}
-        open_written(
-            session, session.write_card(name or "", texts, can_replace=existing == "replace")
-        )
+        if clicks:
+            texts = collect_texts(values, [one.id for one in ids])
+            source = write(session, name or "", texts, can_replace=existing == "replace")
+            session.open_card(source)
+            ui.notify_topic(ui.Topic.LOG)
+            text = f"{source.name} is written and open"
+            ui.notify_opened_log(text, session.work.require_open_log())
 
 
 def _register_fields(page: ui.Page) -> None:
     @page.callback(
         Output("form-fields", "children"),
         Output("form-state", "children"),
-        Output({"note": ALL}, "children"),
-        Output({"question": ALL}, "placeholder"),
-        Input({"question": ALL}, "value"),
-        State({"question": ALL}, "id"),
+        Output({"part": "note", "id": ALL}, "children"),
+        Output({"part": "question", "id": ALL}, "placeholder"),
+        Input({"part": "question", "id": ALL}, "value"),
+        State({"part": "question", "id": ALL}, "id"),
     )
     def fill_in(
-        session: Session, values: Sequence[str | None], ids: Sequence[QuestionId]
+        session: Session, values: Sequence[str | None], ids: Sequence[ControlId]
     ) -> tuple[object, ...]:
         """Ask what follows from the answers; fields stay as long as the questions do."""
         form = session.form
-        changed = [one.get("question") for one in ctx.triggered_prop_ids.values() if one]
+        changed = [one.get("id") for one in ctx.triggered_prop_ids.values() if one]
         # Only changed fields: others may be older than the texts that the server has.
-        rows = [k for k, one in enumerate(ids) if one.question in changed]
-        texts = collect_texts([values[k] for k in rows], [ids[k].question for k in rows])
+        rows = [k for k, one in enumerate(ids) if one.id in changed]
+        texts = collect_texts([values[k] for k in rows], [ids[k].id for k in rows])
         kept = [no_update] * len(ids)
         if form is None or not texts:
             return no_update, no_update, kept, kept
         form.fill_in(texts)
         state = _describe_state(form)
-        if [_name_key(one.question.key) for one in form.entries] != [one.question for one in ids]:
+        if [_name_key(one.question.key) for one in form.entries] != [one.id for one in ids]:
             return _build_fields(form), state, kept, kept
         defaults = [one.question.format_default() for one in form.entries]
         return no_update, state, [_build_notes(one) for one in form.entries], defaults
@@ -125,13 +122,6 @@ def _register_fields(page: ui.Page) -> None:
     def show(session: Session, _: object) -> list[Component]:
         """Draw the form."""
         return [] if session.form is None else build_form(session.form)
-
-
-def open_written(session: Session, source: Source) -> None:
-    """Open a card that was written into the folder."""
-    session.open_card(source)
-    ui.notify_topic(ui.Topic.LOG)
-    ui.notify_opened_log(f"{source.name} is written and open", session.work.require_open_log())
 
 
 def collect_texts(values: Sequence[str | None], ids: Sequence[str]) -> dict[Any, str]:
@@ -152,7 +142,7 @@ def build_form(form: CardForm) -> list[Component]:
     return [
         html.Div(_build_fields(form), id="form-fields"),
         html.P(_describe_state(form), id="form-state", className="hint"),
-        build_writing("card", "File name", form.file_name, "Write and open the card"),
+        build_writing("question", "File name", form.file_name, "Write and open the card"),
     ]
 
 
@@ -207,7 +197,7 @@ def _build_entry(entry: FormEntry) -> Component:
     choices = f"choices {name}" if question.choices else ""
     parts: list[Component] = [
         ui.make_field(
-            {"question": name},
+            {"part": "question", "id": name},
             f"{question.prompt}{unit}",
             type="text",
             value=entry.text,
@@ -215,7 +205,7 @@ def _build_entry(entry: FormEntry) -> Component:
             placeholder=question.format_default(),
             list=choices,
         ),
-        html.Div(_build_notes(entry), id={"note": name}),
+        html.Div(_build_notes(entry), id={"part": "note", "id": name}),
     ]
     if question.choices:
         options = [html.Option(value=str(one)) for one in question.choices]
@@ -223,14 +213,8 @@ def _build_entry(entry: FormEntry) -> Component:
     return html.Div(parts, className="question")
 
 
-class EntryId(BaseModel, strict=True):
-    """Id of a field: the place of its entry as a JSON list."""
-
-    entry: str
-
-
 def _register_edit(page: ui.Page) -> None:
-    """Register the form for the numbers of the open card, and its writing."""
+    """Register the form for the numbers of the open card."""
 
     @page.callback(Output("edit-content", "children"), Input(ui.make_due_id("card"), "data"))
     def show(session: Session, _: object) -> list[Component]:
@@ -240,36 +224,15 @@ def _register_edit(page: ui.Page) -> None:
             return []
         return _build_edit_form(work.card.path.name, list_numbers(session.read_card_text()))
 
-    @page.callback(
-        Input("write-edited", "n_clicks"),
-        State("name-edited", "value"),
-        State("replace-edited", "data-value"),
-        State({"entry": ALL}, "value"),
-        State({"entry": ALL}, "id"),
-        busy="write-edited",
-    )
-    def write(
-        session: Session,
-        clicks: int | None,
-        name: str | None,
-        existing: Literal["keep", "replace"],
-        values: Sequence[str | None],
-        ids: Sequence[EntryId],
-    ) -> None:
-        """Write the card with the typed numbers and open it."""
-        if not clicks:
-            return
-        typed = collect_texts(values, [one.entry for one in ids])
-        open_written(
-            session,
-            session.write_edited_card(name or "", typed, can_replace=existing == "replace"),
-        )
-
 
 def _build_edit_form(name: str, numbers: dict[EntryPath, str]) -> list[Component]:
     fields = [
         ui.make_field(
-            {"entry": json.dumps(path)}, format_path(path), type="text", value=text, debounce=True
+            {"part": "entry", "id": json.dumps(path)},
+            format_path(path),
+            type="text",
+            value=text,
+            debounce=True,
         )
         for path, text in numbers.items()
     ]
@@ -280,7 +243,7 @@ def _build_edit_form(name: str, numbers: dict[EntryPath, str]) -> list[Component
             "deviation, or LOW..HIGH. Comments and all other entries stay."
         ),
         html.Div(fields, className="entries"),
-        build_writing("edited", "Name of the edited card", name, "Write and open the edited card"),
+        build_writing("entry", "Name of the edited card", name, "Write and open the edited card"),
     ]
     return [html.Details(form, id="edit-form")]
 
@@ -326,6 +289,8 @@ def register(page: ui.Page) -> None:
     register_opening(page, "card", "card-file", open_card)
     _register_edit(page)
     _register_form(page)
+    _register_writing(page, "question", Session.write_card)
+    _register_writing(page, "entry", Session.write_edited_card)
 
     @page.callback(
         Output("card-content", "children"),

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from enum import StrEnum
+from typing import Literal
 
 from dash import Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.blocks import build_findings_section, make_table
 from drivetwin.report.figure import get_parameter_label
 from drivetwin.report.sections.parameters import build_result_section
@@ -27,28 +26,7 @@ from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.log import build_facts_line
 from drivetwin.workbench.views.widgets import render_block, render_section, render_table
 
-
-class RunKind(StrEnum):
-    """Methods of a run."""
-
-    DEFAULT = "default"
-    ALL = "all"
-    QUICK = "quick"
-    PAPER = "paper"
-
-
-_METHODS = {
-    RunKind.DEFAULT: (DEFAULT_METHOD,),
-    RunKind.ALL: tuple(Method),
-    RunKind.QUICK: (DEFAULT_METHOD,),
-    RunKind.PAPER: (Method.PAPER,),
-}
-_RUNS = {
-    RunKind.DEFAULT.value: "likelihood, the default method",
-    RunKind.ALL.value: "both methods, to compare",
-    RunKind.QUICK.value: "likelihood, quick: one model alone",
-    RunKind.PAPER.value: "paper alone (no verdict)",
-}
+_EFFORTS = {"full": "full, with other models", "quick": "quick: one model alone"}
 _POLL = 300
 """Time [ms] between two looks at the running job."""
 
@@ -57,10 +35,10 @@ def layout() -> list[Component]:
     """Run, cancel, progress, outcome."""
     return [
         ui.make_hint(
-            "Runs in the background. Fixed and prior settings apply to the likelihood method only."
+            "Runs in the background. Quick fits one model and tries no other minima and elements."
         ),
         ui.make_row(
-            ui.make_choice("methods", "Methods", _RUNS, RunKind.DEFAULT),
+            ui.make_choice("effort", "Effort", _EFFORTS, "full"),
             ui.make_button("Identify", "identify", main=True),
             ui.make_button("Cancel", "cancel", disabled=True),
         ),
@@ -90,10 +68,10 @@ def register(page: ui.Page) -> None:
 
 
 def _register_buttons(page: ui.Page) -> None:
-    @page.callback(Input("identify", "n_clicks"), State("methods", "data-value"))
-    def start(session: Session, _: object, kind: RunKind) -> None:
+    @page.callback(Input("identify", "n_clicks"), State("effort", "data-value"))
+    def start(session: Session, _: object, effort: Literal["full", "quick"]) -> None:
         """Begin the identification."""
-        session.identify(_METHODS[kind], is_quick=kind is RunKind.QUICK)
+        session.identify(is_quick=effort == "quick")
         ui.notify("")
         _notify_results(session)
 
@@ -152,37 +130,24 @@ def _register_progress(page: ui.Page) -> None:
 
 
 def _build_content(work: SessionState, *, running: bool) -> list[Component]:
-    """Build the result of the default method once its run is finished, and what a run takes."""
+    """Build the result once a run is finished, and what a run takes."""
     if work.ratios is not None:
         return _build_bus_content(work, running=running)
     if not work.all_shifts:
         return []
-    content: list[Component] = []
-    for text in dict.fromkeys(work.refusals.values()):
-        methods = [method.value for method, why in work.refusals.items() if why == text]
-        title = f"Identification failed: {', '.join(methods)} method"
-        content.append(ui.make_notes(title, [replace_options(text)]))
-    content += _build_end(work)
-    if not running and work.verdict_outcome is not None:
-        content += _build_result(work.verdict_outcome)
-    elif work.results:
-        names = ", ".join(method.value for method in work.results)
-        content.append(
-            ui.make_hint(
-                f"Finished: {names}. Only the likelihood method gives a verdict on the model. "
-                "Compare shows the values of both methods."
-            )
-        )
+    content = _build_end(work)
+    if not running and work.result is not None:
+        content += _build_result(work.result)
     content.append(_describe_inputs(work))
-    if not running and work.method is None:
+    if not running and work.result is None:
         content.append(_build_known(work))
     return content
 
 
 def _build_end(work: SessionState) -> list[Component]:
-    """Build the reason of an identification that ended early."""
+    """Build the reason of an identification that failed."""
     ended = [replace_options(work.ended)] if work.ended else []
-    return [ui.make_notes("The identification ended early", ended)] if ended else []
+    return [ui.make_notes("The identification failed", ended)] if ended else []
 
 
 def _build_bus_content(work: SessionState, *, running: bool) -> list[Component]:
@@ -209,7 +174,7 @@ def _build_result(outcome: Outcome) -> list[Component]:
     if outcome.found is None:
         count = Counter(one.verdict for one in outcome.twin.parameters.values())
         counts = {verdict.value: str(count[verdict]) for verdict in Verdict if count[verdict]}
-        content.append(build_facts_line({"method": outcome.twin.method.value, **counts}))
+        content.append(build_facts_line(counts))
         content.append(
             ui.make_hint("From the saved workspace; identify again for evidence and report.")
         )

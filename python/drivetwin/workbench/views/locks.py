@@ -107,7 +107,7 @@ def _take_slider(work: SessionState, name: str, value: float | None) -> float | 
 def build_table(work: SessionState, names: Iterable[str]) -> Component:
     """Build the table of parameters with the control of the lock of each."""
     listed = list(names)
-    if work.method:
+    if work.result:
         estimates = work.require_twin().parameters
         block = build_parameter_table({name: estimates[name] for name in listed}, "")
     else:
@@ -138,7 +138,7 @@ def list_default_ids(work: SessionState) -> list[str]:
 
 def build_controls(work: SessionState, name: str, at: Place) -> Component:
     """Build kind, value and standard deviation of the lock of a parameter."""
-    estimate = work.require_twin().parameters.get(name) if work.method else None
+    estimate = work.require_twin().parameters.get(name) if work.result else None
     lock, factor = work.get_lock(name), get_display_unit(get_parameter_spec(name).unit).factor
     value = estimate.value if estimate is not None else None
     if lock.kind is not LockKind.FREE:

@@ -12,7 +12,6 @@ from dash.development.base_component import Component
 
 from drivetwin._util.display_units import format_significant
 from drivetwin.errors import DrivetwinError, InputError, MissingParameterError
-from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.report.figures.stack import Panel
 from drivetwin.report.sections.summary import build_labelled_fits
 from drivetwin.shifts.shift import make_shift_labels
@@ -57,7 +56,7 @@ def layout() -> list[Component]:
 
 
 def register(page: ui.Page) -> None:
-    """Register sliders, the choice of result and shift, and the next identification."""
+    """Register sliders, the choice of the shift, and the next identification."""
     _register_bench(page)
     _register_sliders(page)
     locks.register(page)
@@ -75,7 +74,7 @@ def _register_bench(page: ui.Page) -> None:
     def show(session: Session, _: object) -> list[Component]:
         """Render the sliders next to the figure."""
         work = session.work
-        if work.method is None or not work.all_shifts:
+        if work.result is None or not work.all_shifts:
             return []
         is_first = not work.has_viewed
         try:
@@ -88,26 +87,22 @@ def _register_bench(page: ui.Page) -> None:
 
     @page.callback(Input("identify-again", "n_clicks"))
     def identify_again(session: Session, clicks: int | None) -> None:
-        """Start the default method with the locks as set; the page goes to Identify."""
+        """Start the identification with the locks as set; the page goes to Identify."""
         if clicks:
-            session.identify([DEFAULT_METHOD])
+            session.identify()
             ui.notify_topic(ui.Topic.RESULTS)
 
     @page.callback(Input("reset-sliders", "n_clicks"))
     def reset(session: Session, clicks: int | None) -> None:
         """Back to what was identified."""
         if clicks:
-            session.choose_method(session.work.require_outcome().method)
+            session.reset_sliders()
             ui.notify_topic(ui.Topic.LIVE)
 
-    @page.callback(Input("model-method", "data-value"), Input("model-shift", "data-value"))
-    def choose(session: Session, method: Method | None, shift: Index | None) -> None:
-        """Another result or shift."""
-        work = session.work
-        if method is not None and method is not work.method:
-            session.choose_method(method)
-            ui.notify_topic(ui.Topic.LIVE)
-        if shift is not None and int(shift) != work.shift:
+    @page.callback(Input("model-shift", "data-value"))
+    def choose(session: Session, shift: Index | None) -> None:
+        """Another shift."""
+        if shift is not None and int(shift) != session.work.shift:
             session.choose_shift(int(shift))
             ui.notify_topic(ui.Topic.PHASES)
 
@@ -150,12 +145,9 @@ def _register_sliders(page: ui.Page) -> None:
 
 
 def _build_choices(work: SessionState) -> Component:
-    methods = {method.value: method.value for method in work.results}
     shifts = {str(k): name for k, name in enumerate(make_shift_labels(work.shifts))}
-    shown = work.require_outcome().method.value
     return ui.make_row(
         *build_log_choice(work, Place.MODEL),
-        ui.make_choice("model-method", "Result", methods, shown),
         ui.make_choice("model-shift", "Shift", shifts, str(work.shift)),
         ui.make_button("Reset the sliders", "reset-sliders"),
         html.Button(

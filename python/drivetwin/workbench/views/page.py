@@ -16,7 +16,6 @@ from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views import (
     card,
     channels,
-    compare,
     export,
     identify,
     log,
@@ -60,7 +59,6 @@ _STEPS = {
     Step.EXPORT: export,
 }
 _MORE = {
-    "compare": ("Compare", compare),
     "workspace": ("Workspace", workspace),
 }
 VIEWS = {**{step.value: (TITLES[step], view) for step, view in _STEPS.items()}, **_MORE}
@@ -72,7 +70,6 @@ _TOPICS = {
     "shifts": (Topic.PHASES,),
     "identify": (Topic.RESULTS, Topic.PHASES, Topic.LOCKS, Topic.HELD),
     "model": (Topic.RESULTS, Topic.LIVE),
-    "compare": (Topic.RESULTS,),
     "workspace": (Topic.LOG,),
 }
 """Topics of a session that each view depends on."""
@@ -209,8 +206,8 @@ def _show_status(app: Dash, sessions: Sessions) -> None:
         parts.append(f" · {'no card' if work.card is None else f'card {work.card.name}'}")
         for shift in work.shifts:
             parts.append(f" · shift {shift.name}")
-        if work.results:
-            parts.append(f" · identified: {', '.join(method.value for method in work.results)}")
+        if work.result is not None:
+            parts.append(" · identified")
         if work.bus is not None:
             parts.append(f" · identified: {len(work.bus.found.shifts)} shifts of bus logs")
         return parts

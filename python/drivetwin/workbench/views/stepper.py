@@ -13,7 +13,6 @@ from dash.development.base_component import Component
 
 from drivetwin.channels.roles import NEEDED
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.report.blocks import Tone
 from drivetwin.report.model_verdict import STATUS_TONES
 from drivetwin.shifts.shift import make_shift_labels
@@ -169,11 +168,10 @@ def _assess_identification(work: SessionState, running: bool) -> StepState:
     if not any(one.fitted for one in work.logs):
         text = "Every shift is held out."
         return StepState(Step.IDENTIFY, Status.BLOCKED, text, Step.SHIFTS)
-    if work.verdict_outcome is not None:
-        return _assess_outcome(work.verdict_outcome)
-    if DEFAULT_METHOD in work.refusals or work.ended:
-        return StepState(Step.IDENTIFY, Status.OPEN, "The identification failed.")
-    return StepState(Step.IDENTIFY, Status.OPEN, "Press Identify.")
+    if work.result is not None:
+        return _assess_outcome(work.result)
+    text = "The identification failed." if work.ended else "Press Identify."
+    return StepState(Step.IDENTIFY, Status.OPEN, text)
 
 
 def _assess_bus(work: SessionState) -> StepState:
@@ -208,7 +206,7 @@ def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:
         yield StepState(Step.MODEL, Status.BLOCKED, "Bus logs give quantities, but no model.")
         yield _assess_export(work)
         return
-    if running or work.method is None:
+    if running or work.result is None:
         text = "The identification is running." if running else "Nothing is identified."
         for step in (Step.MODEL, Step.EXPORT):
             yield StepState(step, Status.BLOCKED, text, Step.IDENTIFY)
