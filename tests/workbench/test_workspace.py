@@ -77,7 +77,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], object]:
         (lambda c: c["logs"][0].update(phases={"0": {"dawn": 1.0}}), "phases"),
         (lambda c: c["logs"][0].update(channels={"nonsense": {"source": "x"}}), "channels"),
         (lambda c: c["logs"].append(c["logs"][0]), "twice"),
-        (lambda c: c["twins"]["likelihood"]["bench.csv"].pop("parameters"), "twins"),
+        (lambda c: c["twins"]["bench.csv"].pop("parameters"), "twins"),
     ],
 )
 def test_a_damaged_key_is_named(
