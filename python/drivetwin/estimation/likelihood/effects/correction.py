@@ -137,11 +137,20 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
         change = last = end - moves
         answers.append(_Answer(end, base.spread_amounts(step, shown), std, change / std))
         tried.append(_Tried(base, change, step.chi2))
+        if _is_diverging(answers):
+            break
         moves, amounts = _extrapolate(answers[-CORRECTION.memory - 1 :])
         limit = CORRECTION.settled
-    else:
+    if tried and np.all(np.isfinite(last)):
         base, last = _find_closest(tried, answers, (base, last))
     return _conclude(fit, base, shown, last, evidence, found.sizes)
+
+
+def _is_diverging(answers: Sequence[_Answer]) -> bool:
+    """Return whether the unknowns moved farther in each of the last two steps than in that
+    before."""
+    sizes = [float(np.max(np.abs(one.change))) for one in answers[-3:]]
+    return len(sizes) == 3 and sizes[0] < sizes[1] < sizes[2]
 
 
 def _describe_plant(
