@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 
 from benchmarks.estimation.vehicles import SHIFT, add_tolerances, draw_vehicle, misread
 from drivetwin.channels.roles import Quantity, get_pressure_element
@@ -45,27 +47,40 @@ class MismatchLog:
 
 
 def make_mismatch_log(
-    seed: int, effect: EffectId | None, size: float, rates: Rates, *, tolerances: bool = False
+    seed: int,
+    effect: EffectId | None,
+    size: float,
+    rates: Rates,
+    *,
+    tolerances: bool = False,
+    beside: Mapping[EffectId, float] = MappingProxyType({}),
 ) -> MismatchLog:
     """Make the log of the vehicle of `seed` with one effect of a size, or without effect.
 
-    With `tolerances` the card states those of the sensors, which read wrongly within them. A log
+    Effects `beside` it act as well, by their sizes. With `tolerances` the card states those of the sensors, which read wrongly within them. A log
     with backlash has tips into overrun before the shift.
     Raises InputError for an impossible size, SimulationError where the run does not complete.
     """
-    recorded = record_vehicle(seed, effect, size, rates, tolerances=tolerances)
+    recorded = record_vehicle(seed, effect, size, rates, tolerances=tolerances, beside=beside)
     card = draw_vehicle(seed).card
     return read_back(recorded, add_tolerances(card, recorded.scenario) if tolerances else card)
 
 
 def record_vehicle(
-    seed: int, effect: EffectId | None, size: float, rates: Rates, *, tolerances: bool = False
+    seed: int,
+    effect: EffectId | None,
+    size: float,
+    rates: Rates,
+    *,
+    tolerances: bool = False,
+    beside: Mapping[EffectId, float] = MappingProxyType({}),
 ) -> DynoRun:
     """Record the vehicle of `seed` as `make_mismatch_log` does."""
     scenario = set_rates(hold_load(draw_vehicle(seed).scenario), rates)
-    if effect is EffectId.BACKLASH:
+    sizes = dict(beside) if effect is None else {effect: size, **beside}
+    if EffectId.BACKLASH in sizes:
         scenario = replace(scenario, engine_torque=_build_tips(scenario))
-    recorded = run(scenario, seed, effects={} if effect is None else {effect: size})
+    recorded = run(scenario, seed, effects=sizes)
     return misread(recorded, seed) if tolerances else recorded
 
 

@@ -7,7 +7,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -164,6 +164,30 @@ def study_log(
     return replace(judged, moved=move.values, own_evidence=move.evidence)
 
 
+def study_pair(seed: int) -> StudyLog:
+    """Identify the log of a vehicle with two effects, drawn by its seed."""
+    rng = np.random.default_rng([seed, 37])
+    listed = list(EFFECTS)
+    first, second = (listed[k] for k in rng.choice(len(listed), 2, replace=False))
+    size, other = find_size(seed, first), find_size(seed, second)
+    name = f"{first}+{second}"
+    rates = Rates.BUS if seed % 2 else Rates.LOGGER
+    try:
+        made = make_mismatch_log(
+            seed, first, size, rates, tolerances=seed % 3 == 0, beside={second: other}
+        )
+        found = identify_validated(made.log, made.card)
+    except DrivetwinError as error:
+        none: dict[str, float] = {}
+        return StudyLog(
+            seed, name, size, none, none, (), 0.0, False, error.what, possible=LEAST_POSSIBLE
+        )
+    truth = made.recorded.truth.parameters
+    for effect, one in ((first, size), (second, other)):
+        truth = correct_delay(truth, effect, one)
+    return replace(judge(seed, name, size, found, truth), possible=count_possible(made))
+
+
 def count_possible(made: MismatchLog) -> int:
     """Count the values of the truth that the card does not state exactly."""
     known = sum(one.P0.std == 0.0 for one in made.card.elements.values())
@@ -248,12 +272,22 @@ def run_study(
 ) -> list[StudyLog]:
     """Study one log for each seed; the effects take turns. Print each log as it is done."""
     study = partial(study_log, factor=factor, withheld=withheld)
-    logs = []
     with ProcessPoolExecutor(processes) as pool:
         jobs = [pool.submit(study, one, effects[k % len(effects)]) for k, one in enumerate(seeds)]
-        for job in jobs:
-            logs.append(job.result())
-            print(_format_log(logs[-1]), file=sys.stderr, flush=True)
+        return _collect(jobs)
+
+
+def run_pairs(seeds: Iterable[int], processes: int | None = None) -> list[StudyLog]:
+    """Study one log with two effects for each seed. Print each log as it is done."""
+    with ProcessPoolExecutor(processes) as pool:
+        return _collect([pool.submit(study_pair, one) for one in seeds])
+
+
+def _collect(jobs: Sequence[Future[StudyLog]]) -> list[StudyLog]:
+    logs = []
+    for job in jobs:
+        logs.append(job.result())
+        print(_format_log(logs[-1]), file=sys.stderr, flush=True)
     return logs
 
 
@@ -329,6 +363,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--logs", type=int, default=200, help="departing logs")
     parser.add_argument("--obeying", type=int, default=60, help="logs that obey the model")
+    parser.add_argument("--pairs", type=int, default=0, help="logs with two effects")
     parser.add_argument("--first", type=int, default=1000, help="first seed")
     parser.add_argument("--factor", type=float, default=1.0, help="factor of all sizes")
     parser.add_argument("--withheld", action="store_true", help="switch each true effect off")
@@ -342,7 +377,12 @@ def main() -> None:
     logs = study(seeds, list(EFFECTS))
     seeds = range(given.first + given.logs, given.first + given.logs + given.obeying)
     logs += study(seeds, [None])
-    print("\n".join(summarise(logs)))
+    pairs = run_pairs(range(seeds.stop, seeds.stop + given.pairs), given.processes)
+    print("\n".join(summarise(logs) if logs else []))
+    if pairs:
+        print(_format_row("pairs", pairs))
+        print(f"kept of pairs {_format_kept(pairs)}")
+    logs += pairs
     if given.output:
         given.output.write_text(json.dumps([asdict(one) for one in logs]), encoding="utf-8")
 
