@@ -25,7 +25,6 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.signal import lfilter
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.bus.drift import Swing, build_covariance, fit_noise
@@ -368,6 +367,8 @@ def compute_swing_response(
     Exact for a torque that is linear between the points of a fine grid: the complex state
     z' = λ·z + T with λ = -σ + iω is integrated by its exponential (Hochbruck and Ostermann 2010).
     """
+    from scipy.signal import lfilter
+
     grid = np.arange(time[0], time[-1] + TORQUE.fine, TORQUE.fine)
     values = torque.interpolate(grid + late)
     values = values - values[0]

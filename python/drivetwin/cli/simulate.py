@@ -20,8 +20,9 @@ from drivetwin.export.parameters.files import read_parameters, read_template, re
 from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.parameters.to_twin import update_twin
 from drivetwin.export.targets import DEFAULT_STEP, InputKind
-from drivetwin.files.bus_file import is_tcu_twin, load_tcu_twin, record_prediction
+from drivetwin.files.bus_file import load_tcu_twin, record_prediction
 from drivetwin.files.records import dump_findings
+from drivetwin.files.twin_file import is_tcu_twin
 from drivetwin.fit.fit import predict_recording
 from drivetwin.fit.model_file import read_model
 from drivetwin.report.blocks import Block, Outcome, Tone, build_findings_section, make_notes

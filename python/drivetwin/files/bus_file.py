@@ -27,6 +27,7 @@ from drivetwin.files.records import (
     read_record,
     write_toml,
 )
+from drivetwin.files.twin_file import TCU_TWIN_SCHEMA
 from drivetwin.findings import Finding
 from drivetwin.tcu.card import ControllerCardFile, make_card
 from drivetwin.tcu.identify import TcuTwin
@@ -261,10 +262,6 @@ def _drop_nan(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-TCU_TWIN_SCHEMA = "drivetwin/tcu-twin-1"
-_MARK = f'schema = "{TCU_TWIN_SCHEMA.rpartition("-")[0]}-'
-_HEAD = 2000
-"""Characters in which a file names its schema."""
 _COMMENTS = (
     "Plant of a gearbox with converter, from the log of its control; written by drivetwin.",
     "Coordinates are logarithms of positive numbers; torques and inertias are held for the nominal",
@@ -303,17 +300,6 @@ class TcuTwinFile(Record):
         if any(len(row) != size for row in self.covariance):
             raise ValueError(f"each row of the covariance must be {size}, as names")
         return self
-
-
-def is_tcu_twin(path: Path | str) -> bool:
-    """Return True if a file is a twin from the log of a gearbox control."""
-    try:
-        if not Path(path).is_file():  # a pipe would keep the reader waiting
-            return False
-        with Path(path).open(encoding="utf-8", errors="replace") as file:
-            return _MARK in file.read(_HEAD)
-    except (OSError, ValueError):
-        return False
 
 
 def format_tcu_twin(twin: TcuTwin) -> TcuTwinFile:

@@ -25,7 +25,6 @@ from drivetwin.channels.roles import (
 from drivetwin.errors import InputError, ResultFileError, Where, suggest_spelling
 from drivetwin.estimation.result.estimate import LoadLaw
 from drivetwin.estimation.result.method import Method
-from drivetwin.files.bus_file import is_tcu_twin
 from drivetwin.files.records import (
     ActuatorRecord,
     CovarianceRecord,
@@ -130,6 +129,24 @@ class TwinFile(Record):
     inputs: dict[str, str]
     settings: dict[str, Any]
     assumptions: list[str]
+
+
+TCU_TWIN_SCHEMA = "drivetwin/tcu-twin-1"
+"""Schema of a twin from the log of a gearbox control."""
+_MARK = f'schema = "{TCU_TWIN_SCHEMA.rpartition("-")[0]}-'
+_HEAD = 2000
+"""Characters in which a file names its schema."""
+
+
+def is_tcu_twin(path: Path | str) -> bool:
+    """Return True if a file is a twin from the log of a gearbox control."""
+    try:
+        if not Path(path).is_file():  # a pipe would keep the reader waiting
+            return False
+        with Path(path).open(encoding="utf-8", errors="replace") as file:
+            return _MARK in file.read(_HEAD)
+    except (OSError, ValueError):
+        return False
 
 
 def read_twin_file(path: Path | str) -> TwinFile:
