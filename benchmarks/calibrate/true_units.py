@@ -13,7 +13,6 @@ import numpy as np
 from benchmarks.calibrate.true_vehicle import MadeVehicle
 from benchmarks.estimation.vehicles import draw_errors, misread_channels
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.input_path import DIRECT
 from drivetwin.calibration.maneuver import Control, Maneuver, OperatingPoint, Profiles
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.scenarios import Scenarios, collect_scenarios, scale_units
@@ -60,7 +59,7 @@ class TrueUnits:
         torque = acting["engine_torque"]
         driving = float(torque.values[0]) - added.input_drag
         point = OperatingPoint(driving, shift.point.engine_speed)
-        own = replace(shift, model=self.units[0].model, point=point, added=added, path=DIRECT)
+        own = replace(shift, model=self.units[0].model, point=point, added=added)
         if driving not in self.drawn:
             drivelines = [Driveline(one.model, one.added) for one in self.units]
             self.drawn[driving] = collect_scenarios(own, drivelines)

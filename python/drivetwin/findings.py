@@ -122,7 +122,6 @@ class Code(StrEnum):
     SIMULATION_ENDED_EARLY = auto()
     SIMULATION_DIVERGES = auto()
     OUTSIDE_IDENTIFIED_RANGE = auto()
-    LOG_FOLLOWS_NO_CALIBRATION = auto()
     ACTUATOR_NOT_IDENTIFIED = auto()
     ACTUATOR_UNDETERMINED = auto()
     NOT_VALIDATED = auto()

@@ -111,24 +111,6 @@ _SPECS = (
         "delay of the acting clutch pressures behind the logged ones", -1.0, 1.0,
     ),
     ParameterSpec(
-        "te_lag", "engine torque lag", "τ_l", "s",
-        "first-order lag of the acting engine torque behind the commanded one", 0.0, 1.0,
-    ),
-    ParameterSpec(
-        "te_shift", "engine torque shift", "τ_s", "s",
-        "delay of the acting engine torque behind the commanded one, beside its lag", -1.0, 1.0,
-    ),
-    ParameterSpec(
-        "capacity_slope", "friction over pressure", "a_p", "1",
-        "relative change of the friction coefficient from P0 to the reference pressure above it",
-        -1.0, 1.0, "element",
-    ),
-    ParameterSpec(
-        "capacity_reference", "reference pressure", "p_r", "Pa",
-        "range of pressure above P0 over which the friction coefficient changes by its slope",
-        0.0, 1e8, "element",
-    ),
-    ParameterSpec(
         "mode_frequency", "input-shaft frequency", "f_s", "Hz",
         "frequency of the engine's share of J1 on the input shaft, with the gearbox held", 0.0, 1e3,
     ),

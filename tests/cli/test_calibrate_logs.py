@@ -37,16 +37,14 @@ def test_logs_correct_the_twin_and_the_next_calibration_starts_from_the_last(
     assert main([*given, *short, *logs, "-o", str(second), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["correction"]["rms_after"]["output_torque"] < 30.0
-    assert found["correction"]["calibrations"] == [None]  # the bench drove the starting values
-    assert "log_follows_no_calibration" in [one["code"] for one in found["findings"]]
     gain = found["correction"]["learned"]["mu.B3"]
     assert gain["after_std"] < 0.5 * gain["before_std"]
     page = (second / "report.html").read_text(encoding="utf-8")
     figure = "bench.csv: measured, and predicted before and after the correction."
     assert all(text in page for text in ("Learned from logs", "gain to expect", figure))
     learned = load_twin(second / "twin.toml")
-    ratio = learned.friction["B3"].mu[5] / twin.friction["B3"].mu[5]
-    assert ratio == pytest.approx(1.04, abs=0.015)
+    assert gain["after"] / gain["before"] == pytest.approx(1.04, abs=0.01)
+    assert learned.friction["B3"] != twin.friction["B3"]
     content = read_calibration_file(second / "calibration.toml")
     assert list(content.inputs) == ["t.toml", "bench.csv"]
     starts = {name: one.start for name, one in content.parameters.items()}

@@ -20,6 +20,7 @@ from drivetwin.calibration.metrics import (
 )
 from drivetwin.calibration.scenarios import Scenarios
 from drivetwin.simulation.batch import BatchRequest, Keep
+from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from drivetwin.simulation.element_schema import as_json
 from drivetwin.simulation.network import Output, to_native
 from drivetwin.simulation.network_response import NetworkScenario, to_core_scenarios
@@ -78,16 +79,19 @@ class Plant:
             return self._run_closed_loops([control], scenarios, outputs)[0]
         self.count.runs += scenarios.count
         shift = self.maneuver
-        pressures = {
-            shift.offgoing.name: control.offgoing,
-            shift.oncoming.name: control.oncoming,
+        given = {
+            ENGINE_TORQUE: (control.engine_torque, 0.0),
+            shift.offgoing.name: (control.offgoing, shift.pressure_delay),
+            shift.oncoming.name: (control.oncoming, shift.pressure_delay),
         }
-        elements = shift.model.elements
-        inputs = shift.path.apply(control.engine_torque, pressures, elements, shift.time)
-        given = to_core_scenarios([NetworkScenario(inputs, shift.start)])
+        inputs = {
+            name: Signal(shift.time, np.interp(shift.time, one.arrival + late, one.values))
+            for name, (one, late) in given.items()
+        }
+        native_inputs = to_core_scenarios([NetworkScenario(inputs, shift.start)])
         native = to_native(shift.elements, outputs)
         # Checks of `simulate_network_batch` take a tenth of a run, and these elements are built.
-        asked = BatchRequest.build(given, shift.time, scenarios.sets, native, Keep.COLUMNS)
+        asked = BatchRequest.build(native_inputs, shift.time, scenarios.sets, native, Keep.COLUMNS)
         batch = asked.simulate(as_json(shift.elements), asked.sets, self.threads)
         seen = np.stack([np.asarray(one.values) for one in inputs.values()])[None]
         return Runs(batch.values, batch.last_lock, seen)

@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.input_path import DIRECT, InputPath
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline import (
@@ -123,8 +122,8 @@ class Maneuver:
     """A shift of `model` from its first shift element to its second at an operating point.
 
     `wheel_radius` [m] converts the wheel's motion to the vehicle's. The gear is requested at
-    `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s]. `path` leads from
-    profiles to the inputs that act. `added` are the elements beside the dual clutch.
+    `request` [s]; the run ends at `horizon` [s] and is sampled every `step` [s]. Pressures
+    act `pressure_delay` [s] late. `added` are the elements beside the dual clutch.
     """
 
     model: DualClutch
@@ -133,8 +132,8 @@ class Maneuver:
     request: float = 0.1
     horizon: float = 1.6
     step: float = 1e-3
-    path: InputPath = DIRECT
     added: AddedElements = NO_ADDED_ELEMENTS
+    pressure_delay: float = 0.0
 
     @cached_property
     def time(self) -> FloatArray:

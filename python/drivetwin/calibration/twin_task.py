@@ -17,7 +17,6 @@ from drivetwin.calibration.calibrate import (
 )
 from drivetwin.calibration.certificate import compute_quantiles
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.input_path import InputPath
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, Profiles, check_gears
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import (
@@ -81,9 +80,9 @@ def build_task(twin: Twin, request: Request) -> Task:
     oil = build_oil_state(twin, request)
     model = oil.warm(twin.build_dual_clutch(shift))
     point = choose_point(twin, request)
-    added, path = twin.build_added_elements(model), InputPath.from_twin(twin)
+    added, late = twin.build_added_elements(model), twin.get_value(PRESSURE_DELAY, 0.0)
     radius = request.wheel_radius or twin.wheel_radius or USUAL_WHEEL_RADIUS
-    maneuver = Maneuver(model, point, radius, path=path, added=added)
+    maneuver = Maneuver(model, point, radius, added=added, pressure_delay=late)
     check_gears(maneuver)
     units = None
     if request.policy.commands_actuators:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from drivetwin._util.atomic import compute_digest, write_text
 from drivetwin._util.optional_dependencies import get_program_version
@@ -23,7 +23,7 @@ from drivetwin.calibration.calibrate import Calibration, Task
 from drivetwin.calibration.calibrate import calibrate as run_calibration
 from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.identified_range import check_identified_range
-from drivetwin.calibration.learn import Correction
+from drivetwin.calibration.learn import Correction, correct_twin
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.calibration.operating_map import (
@@ -38,6 +38,7 @@ from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.slip import BENCH, BENCH_DEFINES, HEADER, UserController
 from drivetwin.calibration.polish import require_limits
 from drivetwin.calibration.twin_task import Request, build_task, choose_start
+from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.export import parse_gears
 from drivetwin.cli.input_files import read_twin_log
 from drivetwin.cli.options import RESULT, TWIN
@@ -68,6 +69,7 @@ from drivetwin.files.calibration_file import (
     build_calibration_document,
     build_calibration_file,
     build_certificate_document,
+    read_calibration_file,
     write_calibration_file,
 )
 from drivetwin.files.limits_file import (
@@ -85,27 +87,12 @@ from drivetwin.report.calibration import build_calibration_blocks, build_calibra
 from drivetwin.report.correction import build_correction_blocks
 from drivetwin.report.html import save_page
 from drivetwin.report.model_verdict import explain_result
+from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin
 
-if TYPE_CHECKING:
-    from drivetwin.calibration.compared_shift import DrivenShift
-    from drivetwin.validation.simulate_log import LoggedShift
 
-
-@dataclass(frozen=True)
-class StartFile:
-    """An earlier calibration: its file, operating point (N m, rad/s), and values of the policy."""
-
-    path: Path
-    engine_torque: float
-    engine_speed: float
-    values: Mapping[str, float]
-
-
-def load_starts(paths: Sequence[Path], policy: PolicyKind) -> list[StartFile]:
-    """Load earlier calibrations. Raises InputError for one of another policy."""
-    from drivetwin.files.calibration_file import read_calibration_file
-
+def load_starts(paths: Sequence[Path], policy: PolicyKind) -> list[dict[str, float]]:
+    """Load the values of earlier calibrations. Raises InputError for one of another policy."""
     found = []
     for path in paths:
         content = read_calibration_file(path)
@@ -115,70 +102,23 @@ def load_starts(paths: Sequence[Path], policy: PolicyKind) -> list[StartFile]:
                 f"start from another file, or add --policy {content.policy.value}",
                 Where(file=str(path)),
             )
-        values = {name: one.value for name, one in content.parameters.items()}
-        point = content.point
-        found.append(StartFile(path, point.engine_torque_Nm, point.engine_speed_rad_s, values))
+        found.append({name: one.value for name, one in content.parameters.items()})
     return found
 
 
-def correct_by_logs(
-    twin: Twin, logs: Sequence[Path], request: Request, starts: Sequence[StartFile]
-) -> Correction:
+def correct_by_logs(twin: Twin, logs: Sequence[Path], request: Request) -> Correction:
     """Correct a twin by the shifts between two gears in logs of one vehicle.
 
-    Each log is simulated from the calibration among `starts` that its pressures follow.
     Raises InputError for a log without such a shift and for one that the twin contains,
     IdentificationError where the corrected twin does not explain the logs, and what reading and
     simulation raise.
     """
-    from drivetwin.calibration.learn import correct_twin, require_explained
-
-    logged = [one for path in logs for one in _collect_shifts(twin, path, request.gears)]
-    driven = _match(twin, logged, request, starts)
-    with show_step(f"correcting {twin.name} by {len(logged)} shifts"):
-        found = correct_twin(twin, driven, request.spread, request.seed)
-    require_explained(found)
-    read = {name: sha for one in logged for name, sha in one.log.inputs.items()}
-    return replace(found, twin=replace(found.twin, inputs={**twin.inputs, **read}))
+    read = [_read_shifts(twin, path, request.gears) for path in logs]
+    with show_step(f"correcting {twin.name} by {len(read)} logs"):
+        return correct_twin(twin, read, request.gears, request.spread)
 
 
-def _match(
-    twin: Twin, logged: Sequence[LoggedShift], request: Request, starts: Sequence[StartFile]
-) -> list[DrivenShift]:
-    from drivetwin.calibration.compared_shift import DrivenShift, match_profiles
-    from drivetwin.calibration.twin_task import build_profiles
-
-    profiles, shift = {}, None
-    for one in starts:
-        driven = replace(request, engine_torque=one.engine_torque, engine_speed=one.engine_speed)
-        shift, commanded = build_profiles(twin, driven, one.values)
-        if commanded is not None:
-            profiles[str(one.path)] = commanded
-    if shift is None:
-        return [DrivenShift(one) for one in logged]
-    return [match_profiles(one, profiles, shift) for one in logged]
-
-
-def list_log_findings(found: Correction | None) -> tuple[Finding, ...]:
-    """List the logs that follow none of the calibrations that were given."""
-    from drivetwin.findings import Code, Number, report
-
-    return tuple(
-        report(
-            Code.LOG_FOLLOWS_NO_CALIBRATION,
-            "",
-            Where(file=one.logged.log.source, time=one.logged.shift.before[1]),
-            misfit=Number(one.misfit, "Pa"),
-        )
-        for one in (() if found is None else [fit.shift.driven for fit in found.fits])
-        if one.profiles is None and one.misfit is not None
-    )
-
-
-def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[LoggedShift]:
-    from drivetwin.shifts.detect import require_shifts
-    from drivetwin.validation.simulate_log import LoggedShift
-
+def _read_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> ShiftLog:
     log, card = read_twin_log(twin, path)
     if set(log.inputs.values()) & set(twin.inputs.values()):
         raise InputError(
@@ -186,16 +126,14 @@ def _collect_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> list[Logg
             "give logs that it was not identified or corrected from, or the first twin",
             Where(file=str(path)),
         )
-    shifts = require_shifts(log, card).shifts
-    chosen = [one for one in shifts if (one.start_gear, one.end_gear) == gears]
-    if not chosen:
-        seen = ", ".join(f"{one.start_gear}-{one.end_gear}" for one in shifts)
+    found = {f"{one.start_gear}-{one.end_gear}": one for one in require_shifts(log, card).shifts}
+    if "-".join(gears) not in found:
         raise InputError(
-            f"the log has no shift {'-'.join(gears)}, only {seen}",
+            f"the log has no shift {'-'.join(gears)}, only {', '.join(found)}",
             "give logs of the shift that is calibrated",
             Where(file=str(path)),
         )
-    return [LoggedShift(log, one) for one in chosen]
+    return log
 
 
 def to_correction_document(found: Correction | None) -> dict[str, Any]:
@@ -205,8 +143,8 @@ def to_correction_document(found: Correction | None) -> dict[str, Any]:
     values = {name: one.value for name, one in found.twin.parameters.items()}
     return {
         "correction": {
-            "rms_before": found.before,
-            "rms_after": found.after,
+            "rms_before": {name: before for name, (before, _) in found.rms.items()},
+            "rms_after": {name: after for name, (_, after) in found.rms.items()},
             "parameters": values,
             "learned": {
                 one.id: {
@@ -217,7 +155,6 @@ def to_correction_document(found: Correction | None) -> dict[str, Any]:
                 }
                 for one in found.values
             },
-            "calibrations": [one.shift.driven.calibration or None for one in found.fits],
         }
     }
 
@@ -273,7 +210,6 @@ def calibrate(request: Calibrate) -> Outcome:
         results = _calibrate(model, task, (request.grid, request.front))
         found = results[0]
         findings = check_identified_range(model, found.task.maneuver, found.after.profiles)
-        findings = (*list_log_findings(correction), *findings)
         learned = [] if correction is None else build_correction_blocks(correction, found)
         with show_step(f"writing {request.output}"):
             files = _write_results(request, results, (findings, learned), (model, task))
@@ -326,11 +262,11 @@ def _build_request(
             "give one --start, or the logs that were driven with them (--from-logs)",
         )
     if not logs:
-        return replace(task, start=dict(starts[0].values) if starts else {}), None
-    correction = correct_by_logs(twin, logs, task, starts)
+        return replace(task, start=starts[0] if starts else {}), None
+    correction = correct_by_logs(twin, logs, task)
     if not starts:
         return task, correction
-    return choose_start(correction.twin, task, [one.values for one in starts]), correction
+    return choose_start(correction.twin, task, starts), correction
 
 
 def _calibrate(twin: Twin, request: Request, wanted: tuple[str | None, bool]) -> Results:

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from drivetwin._util.display_units import NM, RPM, spell_unit
 from drivetwin.calibration.calibrate import Calibration
-from drivetwin.calibration.compared_shift import PhaseDeviation
-from drivetwin.calibration.learn import LEARN, Correction, LoggedFit
+from drivetwin.calibration.learn import Correction, LoggedFit
 from drivetwin.calibration.metrics import Metric
-from drivetwin.channels.roles import get_quantity
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.report.blocks import (
     Block,
@@ -31,26 +29,25 @@ def build_correction_blocks(found: Correction, next_one: Calibration) -> list[Bl
 
     `next_one` is the calibration on the corrected twin, whose start is an earlier one.
     """
-    tables = [_build_fit(found), _build_phases(found), _build_values(found)]
+    tables = [_build_fit(found), _build_values(found)]
     return [_build_gain(next_one), *tables, *(_plot_fit(one) for one in found.fits)]
 
 
 def _plot_fit(fit: LoggedFit) -> FigureBlock:
     """Plot the measured signals of a shift over those predicted before and after the correction."""
     panels = []
-    for one in fit.shift.signals:
+    for role, one in fit.after.traces.items():
         drawn = (
-            ("measured", one.values, MEASURED, 1.0),
-            ("predicted before", fit.before[one.role], MUTED, 1.5),
-            ("predicted after", fit.after[one.role], SIMULATED, 1.5),
+            ("measured", one.measured, MEASURED, 1.0),
+            ("predicted before", fit.before.traces[role].simulated, MUTED, 1.5),
+            ("predicted after", one.simulated, SIMULATED, 1.5),
         )
         curves = [Curve(name, one.time, y, colour, width=width) for name, y, colour, width in drawn]
-        display = NM if one.role == "output_torque" else RPM
-        panels.append(Panel(one.role.replace("_", " "), display, curves))
+        display = NM if role == "output_torque" else RPM
+        panels.append(Panel(role.replace("_", " "), display, curves))
     figure = plot_over_time_axis(panels, compute_full_range(panels), 640)
-    source = fit.shift.driven.logged.log.source
     return FigureBlock(
-        figure, f"{source}: measured, and predicted before and after the correction."
+        figure, f"{fit.source}: measured, and predicted before and after the correction."
     )
 
 
@@ -66,32 +63,12 @@ def _build_gain(found: Calibration) -> TilesBlock:
 
 def _build_fit(found: Correction) -> TableBlock:
     rows = []
-    for name, before in found.before.items():
+    for name, (before, after) in found.rms.items():
         unit = "N·m" if name.endswith("torque") else "rad/s"
-        rows.append((name, unit, before, found.after[name]))
+        rows.append((name, unit, before, after))
     return make_table(
         "Logged shifts: RMS deviation of the simulation",
         ("signal", "unit", ("before", ".3g"), ("after", ".3g")),
-        rows,
-    )
-
-
-def _build_phases(found: Correction) -> TableBlock:
-    """Largest deviation of each signal and phase over the shifts."""
-    worst: dict[tuple[str, str], PhaseDeviation] = {}
-    for one in found.phases:
-        key = one.role, one.phase
-        if key not in worst or one.ratio > worst[key].ratio:
-            worst[key] = one
-    rows = [
-        (one.role, one.phase, get_quantity(one.role).unit, one.rms, one.expected, one.ratio)
-        for one in worst.values()
-    ]
-    numbers = (("deviation", ".3g"), ("expected", ".3g"), ("ratio", ".2f"))
-    return make_table(
-        "Largest RMS deviation of the corrected twin by phase; a ratio above "
-        f"{LEARN.misfit:g} is refused",
-        ("signal", "phase", "unit", *numbers),
         rows,
     )
 

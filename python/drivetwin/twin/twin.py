@@ -46,13 +46,8 @@ OF_ELEMENT = ("P0", "drum")
 """Stems of the element parameters that replace the design value if identified."""
 PRESSURE_DELAY = "p_delay"
 """Id of the delay of the acting pressures behind the logged ones."""
-TORQUE_LAG, TORQUE_SHIFT = "te_lag", "te_shift"
-"""Ids of lag and delay of the acting engine torque behind the commanded one."""
-CAPACITY_SLOPE, CAPACITY_REFERENCE = "capacity_slope", "capacity_reference"
-"""Stems of the change of an element's friction over the pressure above P0, and of that range."""
 SIMULATED = (
     *(*COMMON, "J_prime", *OF_ELEMENT, "ratio", FINAL_DRIVE, "te_delay", PRESSURE_DELAY),
-    *(TORQUE_LAG, TORQUE_SHIFT, CAPACITY_SLOPE, CAPACITY_REFERENCE),
     *ADDED_ELEMENT_IDS,
 )
 """Stems of the parameters that a simulation depends on; the others follow from them."""

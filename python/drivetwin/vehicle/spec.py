@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
@@ -113,6 +114,15 @@ class PriorValue:
     def scale(self, factor: float) -> PriorValue:
         """Return the quantity times an exact factor."""
         return replace(self, value=factor * self.value, std=abs(factor) * self.std)
+
+
+@dataclass(frozen=True)
+class SumPrior:
+    """A normal prior on the sum of quantities, by name, times `factors`: `value` with `std`."""
+
+    factors: Mapping[str, float]
+    value: float
+    std: float
 
 
 @dataclass(frozen=True)

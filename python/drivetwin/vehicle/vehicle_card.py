@@ -17,6 +17,7 @@ from drivetwin.vehicle.spec import (
     Gear,
     PriorValue,
     SensorTolerance,
+    SumPrior,
     compute_brake_ratios,
     compute_middle,
 )
@@ -34,7 +35,8 @@ class VehicleCard:
     `sensors` and `channels` go by channel role. `known` is what else is known, by parameter id (see
     parameters.py), `effects` what is known of unmodelled effects. `converter` is the map of
     the torque converter, None where the card has none. `remembered` is the mapping of the log of a
-    twin that the card was made from.
+    twin that the card was made from. `sums` are priors on sums of parameters, by id: those of one
+    joint distribution, along its axes.
     `source` is the file that it was read from and `sha256` that of its content; both empty where
     it is from none, the latter also where it was changed since.
     """
@@ -58,6 +60,7 @@ class VehicleCard:
     sha256: str = ""
     remembered: RememberedMapping = field(default_factory=RememberedMapping)
     wheel_radius: PriorValue | None = None
+    sums: tuple[SumPrior, ...] = ()
 
     @property
     def inputs(self) -> dict[str, str]:

@@ -118,8 +118,8 @@ class Calibrate(
         "Parameter file of your own controller in C; the policy is then own."
     )
     start: tuple[Path, ...] = input_file(
-        "Earlier calibration.toml as the start (may be repeated with --from-logs: each calibration "
-        "that a log was driven with, the last one last).",
+        "Earlier calibration.toml as the start (may be repeated with --from-logs: the best by the "
+        "corrected twin counts).",
         default=(),
     )
     effort: float = option(

@@ -391,6 +391,7 @@ def build_driveline(card: VehicleCard, shift: Shift) -> KnownDriveline:
         eta_change=None if left is None or entered is None else _subtract(entered, left),
         final_drive=card.final_drive,
         ratios={gear.name: _add_input_gear(gear.ratio, card.i_in) for gear in card.gears},
+        sums=card.sums,
     )
 
 

@@ -17,7 +17,7 @@ from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.effects import EffectId, EffectPrior
-from drivetwin.vehicle.spec import PriorValue, SensorTolerance, compute_brake_ratios
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance, SumPrior, compute_brake_ratios
 
 PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox if no output torque shows it."""
@@ -132,6 +132,7 @@ class KnownDriveline:
     far as they are roughly known there, those that the speeds show. `final_drive` and `ratios` by
     gear (without the input gear) are the card's distributions.
     `known` is what is known beforehand, by parameter id, beside Jo′, J1, P0, drums and ratios.
+    `sums` are priors on sums of these, by parameter id.
     `eta_change` is the known efficiency of the gear that is entered less that of the gear that is
     left, None if unknown.
     """
@@ -147,6 +148,7 @@ class KnownDriveline:
     eta_change: PriorValue | None = None
     final_drive: PriorValue | None = None
     ratios: Mapping[str, PriorValue] = field(default_factory=dict)
+    sums: tuple[SumPrior, ...] = ()
 
     @property
     def ratio_priors(self) -> dict[str, PriorValue]:

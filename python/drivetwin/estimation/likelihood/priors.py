@@ -14,7 +14,7 @@ speed passes to the other gear: in a power-on downshift and a power-off upshift.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -53,7 +53,7 @@ from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
 from drivetwin.shifts.shift import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw, Signal
-from drivetwin.vehicle.spec import PARTNER_REST_STD, PriorValue, describe_partner_level
+from drivetwin.vehicle.spec import PARTNER_REST_STD, PriorValue, SumPrior, describe_partner_level
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def build_problem(
         k: (priors[n].value, priors[n].std) for k, n in enumerate(point.names) if n in priors
     }
     prior = Prior.from_independent(len(point.names), entries)
-    sums = list_sum_priors(inertias, drivelines[0].J1, guess["eta"])
+    sums = list_sum_priors(inertias, drivelines[0], guess["eta"])
     prior = add_sum_priors(prior, point, fixed, sums)
     return DualClutchProblem(tuple(terms), prior, lower, upper), point
 
@@ -420,19 +420,11 @@ def build_tie(inertias: Sequence[GearInertia]) -> Tie | None:
     return exact[0] if exact else None
 
 
-@dataclass(frozen=True)
-class SumPrior:
-    """A normal prior on the sum of unknowns times `factors`: `value` with `std`."""
-
-    factors: Mapping[str, float]
-    value: float
-    std: float
-
-
 def list_sum_priors(
-    inertias: Sequence[GearInertia], J1: PriorValue | None, eta: float
+    inertias: Sequence[GearInertia], driveline: KnownDriveline, eta: float
 ) -> list[SumPrior]:
-    """Return the priors on sums: J′ = Je + Jo′/i² of gears, and J1 = Je/η as Je - J1·η = 0.
+    """Return the priors on sums of unknowns: J′ = Je + Jo′/i² of gears, J1 = Je/η as
+    Je - J1·η = 0, and those that are known of parameters.
 
     `eta` is the usual efficiency; of roughly known ratios the nominal value is used, which a sum
     of unknowns allows.
@@ -442,9 +434,26 @@ def list_sum_priors(
         for one in inertias
         if one.prior.std > 0.0
     ]
-    if J1 is not None:
-        found.append(SumPrior({"J_e": 1.0, "eta": -J1.value}, 0.0, eta * J1.std))
-    return found
+    if driveline.J1 is not None:
+        factors = {"J_e": 1.0, "eta": -driveline.J1.value}
+        found.append(SumPrior(factors, 0.0, eta * driveline.J1.std))
+    return found + [_name_unknowns(one, driveline) for one in driveline.sums]
+
+
+def _name_unknowns(one: SumPrior, driveline: KnownDriveline) -> SumPrior:
+    """Return a prior on a sum of parameters with the unknowns that these depend on."""
+    factors: dict[str, float] = {}
+    for name, factor in one.factors.items():
+        plain = name.removesuffix(OVER_ETA)
+        stem, dot, element = plain.partition(".")
+        shares = {f"{element}.{stem}" if dot else plain: 1.0}
+        if plain.startswith(_GEAR_INERTIA):
+            gear = plain.removeprefix(_GEAR_INERTIA)
+            ratio = next(one.ratio for one in driveline.couplings.values() if one.gear == gear)
+            shares = {"J_e": 1.0, "J_out": ratio**-2}
+        for unknown, share in shares.items():
+            factors[unknown] = factors.get(unknown, 0.0) + factor * share
+    return replace(one, factors=factors)
 
 
 def add_sum_priors(
@@ -464,5 +473,7 @@ def add_sum_priors(
         inner = inner + np.outer(row, row) / one.std**2
         pull = pull + row * (one.value - rest) / one.std**2
     precision[np.ix_(place, place)] = inner
-    mean[place] = np.linalg.lstsq(inner, pull, rcond=None)[0]
+    scale = np.sqrt(np.maximum(np.diag(inner), np.finfo(float).tiny))
+    scaled = inner / np.outer(scale, scale)
+    mean[place] = np.linalg.lstsq(scaled, pull / scale, rcond=None)[0] / scale
     return Prior(mean, precision)
