@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //! Bound of the spectral radius of a linear motion.
 
-use super::linalg::Matrix;
+use super::linalg::{Matrix, is_zero};
 use crate::number::{Number, Values};
 
 /// Entries of a row that are multiplied together.
@@ -27,8 +27,10 @@ pub fn spectral_radius_bound<T: Number>(rows: &Matrix<T>) -> T::Values {
     let inverse = size.larger(least).recip();
     power.chunks.as_flattened_mut().iter_mut().for_each(|v| *v *= inverse);
     let mut square = Chunked::zeros(rows.rows);
+    let (mut filled, mut ends) = (Vec::new(), Vec::new());
     for _ in 0..4 {
-        power.square(&mut square);
+        power.list_filled(&mut filled, &mut ends);
+        power.square(&filled, &ends, &mut square);
         std::mem::swap(&mut power, &mut square);
     }
     let root = (0..4).fold(power.max_abs().larger(least), |root, _| root.sqrt());
@@ -52,21 +54,41 @@ impl<V: Values> Chunked<V> {
             .fold(V::zero_(), |largest, v| v.magnitude().larger(largest))
     }
 
-    /// The matrix times itself.
-    fn square(&self, out: &mut Self) {
+    /// Chunks that are not zero: their numbers within their row, row after row, and where each row ends.
+    fn list_filled(&self, filled: &mut Vec<usize>, ends: &mut Vec<usize>) {
+        filled.clear();
+        ends.clear();
+        for row in self.chunks.chunks_exact(self.size.div_ceil(CHUNK)) {
+            for (c, chunk) in row.iter().enumerate() {
+                if !chunk.iter().all(|&v| is_zero(v)) {
+                    filled.push(c);
+                }
+            }
+            ends.push(filled.len());
+        }
+    }
+
+    /// The matrix times itself, whose chunks that are not zero are given as by [`Self::list_filled`]. Of a chain
+    /// these are few: its sixteenth power reaches sixteen neighbours.
+    fn square(&self, filled: &[usize], ends: &[usize], out: &mut Self) {
         let width = self.size.div_ceil(CHUNK);
-        for (row, products) in
-            self.chunks.chunks_exact(width).zip(out.chunks.chunks_exact_mut(width))
-        {
-            for (c, product) in products.iter_mut().enumerate() {
-                let mut sum = [V::zero_(); CHUNK];
-                for (&a, b) in row.as_flattened().iter().zip(self.chunks[c..].iter().step_by(width))
-                {
-                    for i in 0..CHUNK {
-                        sum[i] += a * b[i];
+        out.chunks.fill([V::zero_(); CHUNK]);
+        let of_row = |k: usize| &filled[if k == 0 { 0 } else { ends[k - 1] }..ends[k]];
+        for i in 0..self.size {
+            let products = &mut out.chunks[i * width..(i + 1) * width];
+            for &block in of_row(i) {
+                for (at, &a) in self.chunks[i * width + block].iter().enumerate() {
+                    let k = block * CHUNK + at;
+                    if k >= self.size || is_zero(a) {
+                        continue;
+                    }
+                    for &c in of_row(k) {
+                        let b = &self.chunks[k * width + c];
+                        for (sum, &b) in products[c].iter_mut().zip(b) {
+                            *sum += a * b;
+                        }
                     }
                 }
-                *product = sum;
             }
         }
     }

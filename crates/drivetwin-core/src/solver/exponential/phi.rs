@@ -5,12 +5,13 @@
 //! Plain loops throughout: the body of a closure would be compiled apart, for the least of all processors.
 //! Matrices are written in place: of several runs side by side they are large, and copied where returned.
 
+use crate::network::linalg::is_zero;
 use crate::number::{KernelFloat, Number, Values};
 use crate::solver::sine::Wave;
 use crate::solver::tolerances::{MAX_SPECTRAL_STEP_LINEAR, SERIES_RTOL};
 
 /// A square matrix by rows.
-type Square<T, const N: usize> = [[T; N]; N];
+pub type Square<T, const N: usize> = [[T; N]; N];
 
 /// [`phi_functions`], S_0 first.
 pub type PhiFunctions<T, const N: usize> = [Square<T, N>; FORCING_DEGREE + 1];
@@ -75,32 +76,60 @@ pub fn phi_functions<T: Number, const F: bool, const N: usize>(
     }
 }
 
-/// Double the step `h` [s] of [`phi_functions`]. Without the identity the transition of slow modes keeps its
+/// Double the step of the transition matrix without the identity. So the transition of slow modes keeps its
 /// digits over any number of doublings (scaling and squaring).
 #[inline(always)]
-pub fn double_phi_functions<T: Number, const F: bool, const N: usize>(
-    all: &mut PhiFunctions<T, N>,
-    h: f64,
+pub fn double_transition<T: Number, const F: bool, const N: usize>(
+    transition: &mut Square<T, N>,
     n: usize,
 ) {
     let mut product = [[T::zero_(); N]; N];
-    for k in (0..=FORCING_DEGREE).rev() {
-        multiply::<T, F, N>(&all[0], &all[k], n, &mut product);
-        let mut weight = 1.0;
+    multiply::<T, F, N>(transition, transition, n, &mut product);
+    for i in 0..span::<T, N>(n) {
+        for j in 0..span::<T, N>(n) {
+            transition[i][j] = product[i][j] + transition[i][j] + transition[i][j];
+        }
+    }
+}
+
+/// Responses of the state at the end of a step to a force `e`, to `e t`, and to a wave of that force.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceResponse<T, const N: usize> {
+    /// To `e` and to `e t`.
+    pub ramp: [[T; N]; 2],
+    /// To a wave of angular frequency, where there is one.
+    pub wave: Option<WaveResponse<T, N>>,
+}
+
+/// Responses to the constant and to each input, `None` to one that does not act on the state.
+pub type ForceResponses<T, const N: usize> = Vec<Option<ForceResponse<T, N>>>;
+
+impl<T: Number, const N: usize> ForceResponse<T, N> {
+    /// For a force, and for its wave of angular frequency `omega` [rad/s].
+    #[inline(always)]
+    pub fn of<const F: bool>(
+        s: &PhiFunctions<T, N>,
+        force: &[T; N],
+        omega: Option<f64>,
+        n: usize,
+    ) -> Self {
+        let ramp = [apply::<T, F, N>(&s[1], force, n), apply::<T, F, N>(&s[2], force, n)];
+        Self { ramp, wave: omega.map(|omega| WaveResponse::of::<F>(s, force, omega, n)) }
+    }
+
+    /// Double the step `h` [s]; `transition` is that of the single step without the identity.
+    #[inline(always)]
+    pub fn double<const F: bool>(&mut self, transition: &Square<T, N>, h: f64, n: usize) {
+        let [held, rising] = self.ramp;
+        let moved =
+            [apply::<T, F, N>(transition, &held, n), apply::<T, F, N>(transition, &rising, n)];
         for i in 0..span::<T, N>(n) {
-            for j in 0..span::<T, N>(n) {
-                product[i][j] += all[k][i][j] + all[k][i][j];
-            }
+            self.ramp[0][i] = moved[0][i] + held[i] + held[i];
+            self.ramp[1][i] = held[i].fma_times::<F>(h, moved[1][i] + rising[i] + rising[i]);
         }
-        for lower in (1..k).rev() {
-            weight *= h / (k - lower) as f64;
-            for i in 0..span::<T, N>(n) {
-                for j in 0..span::<T, N>(n) {
-                    product[i][j] = all[lower][i][j].fma_times::<F>(weight, product[i][j]);
-                }
-            }
+        if let Some(wave) = &mut self.wave {
+            wave.double::<F>(transition, h, n);
         }
-        all[k] = product;
     }
 }
 
@@ -138,12 +167,13 @@ impl<T: Number, const N: usize> WaveResponse<T, N> {
         Self { omega, parts }
     }
 
-    /// Double the step `h` [s]; `s` are those of the single step.
-    pub fn double<const F: bool>(&mut self, s: &PhiFunctions<T, N>, h: f64, n: usize) {
+    /// Double the step `h` [s]; `transition` is that of the single step without the identity.
+    pub fn double<const F: bool>(&mut self, transition: &Square<T, N>, h: f64, n: usize) {
         let [cosine, sine] = self.parts;
         let (sin, cos) = (self.omega * h).sin_cos();
         let sin_over = if self.omega == 0.0 { h } else { sin / self.omega };
-        let moved = [apply::<T, F, N>(&s[0], &cosine, n), apply::<T, F, N>(&s[0], &sine, n)];
+        let moved =
+            [apply::<T, F, N>(transition, &cosine, n), apply::<T, F, N>(transition, &sine, n)];
         for i in 0..N {
             let (c, q) = (cosine[i], sine[i]);
             self.parts[0][i] = moved[0][i] + c * (1.0 + cos) - q * (self.omega * sin);
@@ -188,7 +218,8 @@ pub fn add_to_diagonal<T: Number, const N: usize>(a: &mut Square<T, N>, value: T
     }
 }
 
-/// Product of two matrices, in place of what is in `out`.
+/// Product of two matrices, in place of what is in `out`. Plain numbers go by rows, and a left factor may be
+/// sparse: that of a chain of inertias is.
 #[inline(always)]
 fn multiply<T: Number, const F: bool, const N: usize>(
     a: &Square<T, N>,
@@ -197,13 +228,25 @@ fn multiply<T: Number, const F: bool, const N: usize>(
     out: &mut Square<T, N>,
 ) {
     for i in 0..span::<T, N>(n) {
-        for j in 0..span::<T, N>(n) {
-            let mut sum = T::zero_();
-            for k in 0..span::<T, N>(n) {
-                sum = a[i][k].fma::<F>(b[k][j], sum);
+        if T::DERIVATIVES || T::RUNS > 1 {
+            for j in 0..n {
+                let mut sum = T::zero_();
+                for k in 0..n {
+                    sum = a[i][k].fma::<F>(b[k][j], sum);
+                }
+                out[i][j] = sum;
             }
-            out[i][j] = sum;
+            continue;
         }
+        let mut row = [T::zero_(); N];
+        for k in 0..N {
+            if !is_zero(a[i][k]) {
+                for j in 0..N {
+                    row[j] = a[i][k].fma::<F>(b[k][j], row[j]);
+                }
+            }
+        }
+        out[i] = row;
     }
 }
 

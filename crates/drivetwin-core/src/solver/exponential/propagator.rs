@@ -10,8 +10,8 @@ use crate::network::smooth_law::{AffineForm, MAX_INPUTS, SmoothLaw};
 use crate::network::{Mode, Network};
 use crate::number::{KernelFloat, Number, Values};
 use crate::solver::exponential::phi::{
-    FORCING_DEGREE, N_BASIS, PhiFunctions, WaveResponse, add_to_diagonal, apply, dot,
-    double_phi_functions, doublings, forcing_response, phi_functions, span,
+    FORCING_DEGREE, ForceResponse, ForceResponses, N_BASIS, PhiFunctions, add_to_diagonal, dot,
+    double_transition, doublings, forcing_response, phi_functions, span,
 };
 use crate::solver::simd::{Kernel, dispatch_simd};
 use crate::solver::sine::Wave;
@@ -239,41 +239,39 @@ struct BuildKernel<'b, T, const N: usize> {
 }
 
 impl<T: Number, const N: usize> BuildKernel<'_, T, N> {
-    /// Responses to the inputs that are waves, at the first step.
-    fn responses_to_waves<const F: bool>(
-        &self,
-        s: &PhiFunctions<T, N>,
-    ) -> Vec<Option<WaveResponse<T, N>>> {
-        let response = |(input, wave): (usize, &Option<Wave>)| {
-            let force = forcing(self.mode, self.network.first_input() + input);
-            wave.map(|wave| WaveResponse::of::<F>(s, &force, wave.omega, self.network.states()))
-        };
-        self.waves.iter().enumerate().map(response).collect()
+    /// Responses to the constant and to the inputs, at the first step; `None` to inputs that do not act on the
+    /// state.
+    #[inline(always)]
+    fn responses<const F: bool>(&self, s: &PhiFunctions<T, N>) -> ForceResponses<T, N> {
+        let Self { network, mode, waves, .. } = *self;
+        let (n, inputs) = (network.states(), network.mechanism.inputs.len());
+        let mut responses = vec![None; 1 + inputs];
+        responses[0] = Some(ForceResponse::of::<F>(s, &forcing(mode, network.one()), None, n));
+        for input in 0..inputs {
+            if network.is_driven_by(input) {
+                let force = forcing(mode, network.first_input() + input);
+                let omega = waves.get(input).copied().flatten().map(|wave| wave.omega);
+                responses[1 + input] = Some(ForceResponse::of::<F>(s, &force, omega, n));
+            }
+        }
+        responses
     }
 
-    /// Effects of the inputs that act on the state.
+    /// Effects of the constant and of the inputs that act on the state.
     #[inline(always)]
-    fn add_inputs<const F: bool>(
-        &self,
-        operators: &mut Propagator<T, N>,
-        s: &PhiFunctions<T, N>,
-        responses_to_waves: &[Option<WaveResponse<T, N>>],
-    ) {
-        for input in 0..self.network.mechanism.inputs.len() {
-            if self.network.is_driven_by(input) {
-                let force = forcing(self.mode, self.network.first_input() + input);
-                let first = apply::<T, F, N>(&s[1], &force, operators.states);
-                let mut step = [first, apply::<T, F, N>(&s[2], &force, operators.states)];
-                if let Some(Some(wave)) = responses_to_waves.get(input) {
-                    // The offset is there throughout, and the wave is what the input is off it.
-                    let offset = self.waves[input].map_or(0.0, |wave| wave.offset);
-                    for i in 0..N {
-                        operators.constant[i] += (step[0][i] - wave.parts[0][i]) * offset;
-                    }
-                    step = wave.parts;
+    fn add_inputs(&self, operators: &mut Propagator<T, N>, responses: &ForceResponses<T, N>) {
+        operators.constant = responses[0].map_or(operators.constant, |response| response.ramp[0]);
+        for (input, response) in responses[1..].iter().enumerate() {
+            let Some(ForceResponse { ramp: mut step, wave }) = *response else { continue };
+            if let Some(wave) = wave {
+                // The offset is there throughout, and the wave is what the input is off it.
+                let offset = self.waves[input].map_or(0.0, |wave| wave.offset);
+                for i in 0..N {
+                    operators.constant[i] += (step[0][i] - wave.parts[0][i]) * offset;
                 }
-                operators.inputs.push(InputMap::new(input, step));
+                step = wave.parts;
             }
+            operators.inputs.push(InputMap::new(input, step));
         }
     }
 }
@@ -294,6 +292,9 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
             return None;
         }
         let doublings = if T::RUNS == 1 { doublings(reach.re().run_value(0), waves, h) } else { 0 };
+        if doublings > 0 && !active.is_empty() {
+            return None;
+        }
         let first = h * 0.5_f64.powi(doublings);
         let n = network.states();
         let mut a = [[T::zero_(); N]; N];
@@ -302,14 +303,13 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
         }
         let mut s = [[[T::zero_(); N]; N]; FORCING_DEGREE + 1];
         phi_functions::<T, F, N>(&a, first, reach * (first / h), n, &mut s);
-        let mut responses_to_waves = self.responses_to_waves::<F>(&s);
+        let mut responses = self.responses::<F>(&s);
         let mut length = first;
         for _ in 0..doublings {
-            responses_to_waves
-                .iter_mut()
-                .flatten()
-                .for_each(|wave| wave.double::<F>(&s, length, n));
-            double_phi_functions::<T, F, N>(&mut s, length, n);
+            for response in responses.iter_mut().flatten() {
+                response.double::<F>(&s[0], length, n);
+            }
+            double_transition::<T, F, N>(&mut s[0], n);
             length *= 2.0;
         }
         add_to_diagonal(&mut s[0], T::of(1.0));
@@ -321,19 +321,18 @@ impl<T: Number, const N: usize> Kernel for BuildKernel<'_, T, N> {
                 operators.transition[j][i] = s[0][i][j];
             }
         }
-        operators.constant = apply::<T, F, N>(&s[1], &forcing(mode, network.one()), n);
-        self.add_inputs::<F>(&mut operators, &s, &responses_to_waves);
-        let mut responses: SmallVec<[[[T; N]; N_BASIS]; 2]> = SmallVec::new();
+        self.add_inputs(&mut operators, &responses);
+        let mut forced: SmallVec<[[[T; N]; N_BASIS]; 2]> = SmallVec::new();
         for (slot, &j) in active.iter().enumerate() {
             operators.signs[slot] = laws[slot].sign;
             let mut force = forcing(mode, network.first_channel() + j);
             for i in 0..span::<T, N>(n) {
                 force[i] *= laws[slot].sign;
             }
-            responses.push(forcing_response::<T, F, N>(&s, &force, h, n));
+            forced.push(forcing_response::<T, F, N>(&s, &force, h, n));
         }
         for slot in 0..active.len() {
-            operators.carry::<F>(slot, &self, &responses);
+            operators.carry::<F>(slot, &self, &forced);
         }
         // Inner loops exist for 0, 1, 2 and 4 channels.
         if operators.channels.len() == 3 {
