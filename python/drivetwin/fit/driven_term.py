@@ -99,7 +99,8 @@ class DrivenTerm:
 
     `delays` are the unknown delays of the outputs by their names. `steps` are the steps of the
     coordinates for differences over the paths; a step below the deviation of a coordinate counts
-    kinks of the actuators as information.
+    kinks of the actuators as information. `memory` has the last linearisation, which other weights
+    and steps do not change.
     """
 
     plant: Plant
@@ -110,6 +111,7 @@ class DrivenTerm:
     weighting: Whitener
     label: str = ""
     inputs: Mapping[str, Signal] = field(default_factory=dict)
+    memory: dict[bytes, tuple[FloatArray, FloatArray]] = field(default_factory=dict, repr=False)
 
     @property
     def speeds(self) -> list[str]:
@@ -170,6 +172,9 @@ class DrivenTerm:
 
     def predict(self, point: ParameterVector) -> FloatArray | None:
         """Compute the compared samples (size,) at `point`; None if the simulation fails."""
+        known = self.memory.get(self.select(point).values.tobytes())
+        if known is not None:
+            return known[0]
         try:
             run = self.simulate(point)
         except InputError:
@@ -191,6 +196,28 @@ class DrivenTerm:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
         `point`; None if the simulation fails."""
         own = self.select(point)
+        key = own.values.tobytes()
+        if key not in self.memory:
+            found = self._linearise_plant(point, own)
+            self.memory.clear()
+            if found is None:
+                return None
+            self.memory[key] = found
+        simulated, slopes = self.memory[key]
+        through = self._differentiate_paths(own)
+        if through is None:
+            return None
+        slopes = slopes + self.sample(point, through)
+        if not np.all(np.isfinite(slopes)):
+            return None
+        every = place_columns(slopes, self._find_places(point), len(point.names))
+        return self.record.measured - simulated, every
+
+    def _linearise_plant(
+        self, point: ParameterVector, own: ParameterVector
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """Compute the simulated samples (n,) and their derivatives (n, k) by the coordinates of
+        this recording, but for those through the inputs; None if the simulation fails."""
         variables = own.to_variables(self._apart)
         task = self.plant.build_task(variables, self.drive(own), self.record.time)
         try:
@@ -202,10 +229,6 @@ class DrivenTerm:
         columns = self._name_columns(found.run.columns)
         simulated = self.sample(point, columns)
         slopes = self.sample(point, self._name_columns(found.derivatives))
-        through = self._differentiate_paths(own)
-        if through is None:
-            return None
-        slopes += self.sample(point, through)
         first = 0
         for out in self.record.outputs:
             count, name = out.values.size, self.delays[out.name]
@@ -220,10 +243,7 @@ class DrivenTerm:
             if there is None:
                 return None
             slopes[:, self.names.index(name)] += (there - simulated) / _STEP
-        if not np.all(np.isfinite(slopes)):
-            return None
-        every = place_columns(slopes, self._find_places(point), len(point.names))
-        return self.record.measured - simulated, every
+        return simulated, slopes
 
     @cached_property
     def _apart(self) -> list[str]:

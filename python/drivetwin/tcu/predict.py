@@ -146,7 +146,8 @@ def _hold(
 def _cut(problem: DrivenProblem, shift: ControllerShift, twin: TcuTwin) -> DrivenProblem:
     """Compare the rows before the change of the commanded gear alone."""
     (term,) = problem.terms
-    term = replace(term, record=term.record.cut(shift.change)).weigh(twin.noise.own)
+    own = replace(term, record=term.record.cut(shift.change), memory={})
+    term = own.weigh(twin.noise.own)
     return replace(problem, terms=(term,))
 
 
