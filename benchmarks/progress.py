@@ -28,7 +28,7 @@ from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.calibrate import Task as CalibrationTask
 from drivetwin.calibration.maneuver import OperatingPoint
 from drivetwin.calibration.operating_map import Grid, calibrate_map, trace_front
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli.identify import load_identified_card, read_shifts
 from drivetwin.cli.output import Remaining

@@ -44,7 +44,7 @@ from benchmarks.calibrate.statement import (
 from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import CalibrationSettings, compute_tail_mean
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.scenarios import Purpose, draw_scenarios
 
 TAIL = 0.9

@@ -39,7 +39,7 @@ from drivetwin.calibration.learn import correct_twin
 from drivetwin.calibration.maneuver import Profiles
 from drivetwin.calibration.metrics import Metric, Outcome
 from drivetwin.calibration.objective import CalibrationSettings, Objective
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
 from drivetwin.calibration.spread import Spread

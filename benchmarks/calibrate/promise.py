@@ -33,7 +33,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import CalibrationSettings
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.spread import OilFriction, OilState, Spread
 from drivetwin.calibration.twin_task import build_task

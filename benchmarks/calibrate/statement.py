@@ -24,13 +24,12 @@ from drivetwin.calibration.calibrate import Task
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import CalibrationSettings, Limit, Statistic
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policies.controller import build_controller_policy
-from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.slip import build_slip_policy
 from drivetwin.calibration.policies.table import KnotPolicy, KnotProfile, join_profiles
-from drivetwin.calibration.scenarios import Draw, MakeDriveline, scale_units
+from drivetwin.calibration.scenarios import Draw, MakeDriveline, UnitDraws, scale_units
 from drivetwin.calibration.spread import Spread
-from drivetwin.calibration.units import UnitDraws
 from drivetwin.simulation.driveline import Driveline
 from drivetwin.simulation.dual_clutch import DualClutch
 from tests.support.upshift.scenario import build_model

@@ -33,7 +33,7 @@ from drivetwin.actuator.model import ActuatorModel, HeldSignal
 from drivetwin.calibration.maneuver import ClosedLoop, Maneuver
 from drivetwin.calibration.metrics import Metric, Runs, compute_metrics
 from drivetwin.calibration.objective import CalibrationSettings
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.twin_task import Request
 from drivetwin.channels.roles import Quantity, make_command_role
 from drivetwin.channels.units import BAR

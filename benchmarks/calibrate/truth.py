@@ -25,7 +25,7 @@ from drivetwin.calibration.calibrate import Assessment, calibrate
 from drivetwin.calibration.maneuver import ClosedLoop
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import CalibrationSettings
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.twin_task import build_task
 from drivetwin.errors import DrivetwinError
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin.calibration.maneuver import Maneuver, OperatingPoint
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.channels.roles import Quantity
 from drivetwin.dyno.dyno import Motion, list_sampling_instants, record_channels

@@ -14,7 +14,7 @@ from drivetwin.calibration.evaluate import Plant
 from drivetwin.calibration.maneuver import ClosedLoop, compute_nominal_profiles
 from drivetwin.calibration.metrics import list_outputs
 from drivetwin.calibration.objective import CalibrationSettings
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.scenarios import Purpose, collect_scenarios
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.twin.twin import Twin

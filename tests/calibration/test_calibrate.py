@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin.calibration.calibrate import Calibration, Task, calibrate
-from drivetwin.calibration.lower_bound import compute_lower_bound
+from drivetwin.calibration.calibrate import Calibration, Task, calibrate, compute_lower_bound
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Limit
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from tests.calibration.cases import QUICK, SHIFTS, make_task
 
 TIME = (Limit(Metric.SHIFT_TIME, 0.95),)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.metrics import Metric, list_outputs
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.simulation.network import simulate
 from drivetwin.simulation.shift_control import SpeedSensor
 from tests.calibration.cases import (

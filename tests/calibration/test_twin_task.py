@@ -12,7 +12,7 @@ import pytest
 from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Hardware, Limit
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.spread import OilFriction, Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import IdentificationError, InputError

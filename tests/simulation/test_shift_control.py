@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.actuator.model import ActuatorModel, HeldSignal
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.errors import InputError
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import Signal

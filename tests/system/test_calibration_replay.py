@@ -12,7 +12,7 @@ import pytest
 from drivetwin.calibration.calibrate import calibrate
 from drivetwin.calibration.metrics import METRICS, Metric, Runs, compute_metrics
 from drivetwin.calibration.objective import Limit
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.spread import Spread
 from tests.calibration.cases import QUICK, SHIFTS, SYSTEM, make_task
 from tests.calibration.twins import ACTUATOR, make_exact_twin

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.authoring.sensor_classes import read_sensor_classes
+from drivetwin.authoring.element_questions import read_sensor_classes
 from drivetwin.vehicle.card import load_card
 from tests.support.bus_logs import BUS_LOGS, write_bus_logs
 from tools.run_page import BLOCK, DOCS, find_outdated, run_line, run_page

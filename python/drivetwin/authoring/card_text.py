@@ -18,7 +18,14 @@ from drivetwin._util.toml import (
     parse_toml,
     raise_faults,
 )
-from drivetwin.authoring.element_questions import KEY, describe_product, find_form, format_converter
+from drivetwin.authoring.element_questions import (
+    KEY,
+    SensorAnswer,
+    describe_product,
+    find_form,
+    format_converter,
+    get_offset_unit,
+)
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.question import (
@@ -31,7 +38,6 @@ from drivetwin.authoring.question import (
     list_elements,
     list_gears,
 )
-from drivetwin.authoring.sensor_classes import SensorAnswer, get_offset_unit
 from drivetwin.authoring.stated_number import StatedNumber, parse_range, parse_stated
 from drivetwin.errors import CardError, InputError, Where
 from drivetwin.vehicle.card import check_card

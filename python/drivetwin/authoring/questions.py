@@ -14,7 +14,15 @@ from drivetwin.authoring.derive import (
     reduce_gears,
     refuse_irreducible,
 )
-from drivetwin.authoring.element_questions import KEY, iterate_element_questions, parse_converter
+from drivetwin.authoring.element_questions import (
+    KEY,
+    get_offset_unit,
+    iterate_element_questions,
+    list_classes,
+    parse_converter,
+    parse_sensor,
+    read_sensor_classes,
+)
 from drivetwin.authoring.log_estimates import LogEstimates
 from drivetwin.authoring.log_survey import LogSurvey, assign_pressures
 from drivetwin.authoring.question import (
@@ -26,12 +34,6 @@ from drivetwin.authoring.question import (
     Question,
     get_value,
     make_question,
-)
-from drivetwin.authoring.sensor_classes import (
-    get_offset_unit,
-    list_classes,
-    parse_sensor,
-    read_sensor_classes,
 )
 from drivetwin.authoring.stated_number import StatedNumber, parse_choice, parse_names, parse_range
 from drivetwin.channels.roles import get_pressure_element

@@ -29,9 +29,14 @@ from drivetwin.calibration.metrics import Metric, Outcome, compute_metrics, list
 from drivetwin.calibration.objective import build_limit_keys
 from drivetwin.calibration.policies.slip import UserController
 from drivetwin.calibration.policy import Space
-from drivetwin.calibration.scenarios import Draw, MakeDriveline, Purpose, draw_scenarios
+from drivetwin.calibration.scenarios import (
+    Draw,
+    MakeActuators,
+    MakeDriveline,
+    Purpose,
+    draw_scenarios,
+)
 from drivetwin.calibration.twin_task import Request, build_task, choose_point
-from drivetwin.calibration.units import MakeActuators
 from drivetwin.errors import ControllerError
 from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.simulation.driveline_run import INPUTS as SIGNALS

@@ -30,9 +30,8 @@ from drivetwin.calibration.options import USUAL_WHEEL_RADIUS, CalibrationOptions
 from drivetwin.calibration.policies.slip import UserController
 from drivetwin.calibration.policies.table import POLICIES, PolicySetup
 from drivetwin.calibration.policy import Policy, Space
-from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws
+from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws, UnitDraws
 from drivetwin.calibration.spread import OilFriction, OilState, Spread
-from drivetwin.calibration.units import UnitDraws
 from drivetwin.errors import IdentificationError, InputError, Where
 from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.estimation.result.estimate import Verdict

@@ -33,8 +33,7 @@ from drivetwin.calibration.operating_map import (
     calibrate_map,
     trace_front,
 )
-from drivetwin.calibration.options import CalibrationOptions
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import CalibrationOptions, PolicyKind
 from drivetwin.calibration.policies.slip import BENCH, BENCH_DEFINES, HEADER, UserController
 from drivetwin.calibration.polish import require_limits
 from drivetwin.calibration.twin_task import Request, build_task, choose_start

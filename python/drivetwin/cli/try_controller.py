@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from drivetwin.calibration.options import ShiftOptions
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind, ShiftOptions
 from drivetwin.calibration.trial import Difference, Trial, compare_trials, run_trials
 from drivetwin.calibration.twin_task import Request
 from drivetwin.cli.calibrate import compile_controller, load_valid_twin

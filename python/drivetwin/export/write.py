@@ -6,15 +6,24 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from drivetwin.drive import load_powertrain
+from drivetwin.export.c import write_c
+from drivetwin.export.entries import Subject
+from drivetwin.export.fmu.build import BuildOptions, Experiment, build_fmu
+from drivetwin.export.modelica.model import write_modelica
+from drivetwin.export.parameters.content import ParameterSet
+from drivetwin.export.parameters.files import (
+    ParameterFormat,
+    apply_template,
+    read_template,
+    require_labels,
+    show_units,
+    write_parameters,
+)
+from drivetwin.export.parameters.of_twin import collect_parameters
 from drivetwin.export.targets import ExportOptions, Target
-
-if TYPE_CHECKING:
-    from drivetwin.export.entries import Subject
-    from drivetwin.export.fmu.build import Experiment
-    from drivetwin.export.parameters.content import ParameterSet
-    from drivetwin.twin.twin import Twin
+from drivetwin.twin.twin import Twin
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,18 +44,12 @@ def write_export(
     """
     match options.to:
         case Target.C:
-            from drivetwin.export.c import write_c
-
             write_c((model := load()).subject, path)
         case Target.FMU:
-            from drivetwin.export.fmu.build import BuildOptions, build_fmu
-
             model = load()
             build = BuildOptions(options.fmi, options.platforms, model.experiment)
             build_fmu(model.subject, path, build)
         case Target.MODELICA:
-            from drivetwin.export.modelica.model import write_modelica
-
             model = load()
             write_modelica(model.subject, model.experiment, path)
         case _:
@@ -56,9 +59,6 @@ def write_export(
 
 def _write_twin_parameters(twin: Twin, options: ExportOptions, path: Path) -> ParameterSet:
     """Write the parameters of a twin; return them."""
-    from drivetwin.drive import load_powertrain
-    from drivetwin.export.parameters.of_twin import collect_parameters
-
     powertrain = options.powertrain
     converter = None if powertrain is None else load_powertrain(powertrain).converter
     unvalued = [one.id for one in twin.parameters.values() if one.value is None]
@@ -73,15 +73,6 @@ def write_content(
 
     A template gives layout and units. Without one, files of calibration tools are in bar and rpm.
     """
-    from drivetwin.export.parameters.files import (
-        ParameterFormat,
-        apply_template,
-        read_template,
-        require_labels,
-        show_units,
-        write_parameters,
-    )
-
     kind = ParameterFormat(options.to.value)
     if options.template is None:
         content = show_units(content, kind)

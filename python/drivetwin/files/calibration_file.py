@@ -16,7 +16,7 @@ from drivetwin.calibration.certificate import LimitState
 from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import build_limit_keys
 from drivetwin.calibration.operating_map import Arm, Front, MapPoint, OperatingMap
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policy import Policy
 from drivetwin.calibration.spread import Spread
 from drivetwin.files.records import Record, SchemaName, read_record, write_toml

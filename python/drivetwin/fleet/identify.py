@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -62,10 +61,6 @@ from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import load_card, load_ratio_card
 from drivetwin.vehicle.vehicle_card import VehicleCard
-
-if TYPE_CHECKING:
-    from drivetwin.channels.shiftlog import ShiftLog
-
 
 LIBRARY = "plotly.js"
 

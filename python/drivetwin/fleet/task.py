@@ -8,12 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.method import Method
-
-if TYPE_CHECKING:
-    from drivetwin.estimation.result.estimate import Estimate
 
 
 @dataclass(frozen=True)

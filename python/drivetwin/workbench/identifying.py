@@ -26,7 +26,7 @@ from drivetwin.validation.validated_model import Source, identify_together
 from drivetwin.vehicle.card import RatioCard
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from drivetwin.workbench.jobs import Emit
-from drivetwin.workbench.zoom import parse_number
+from drivetwin.workbench.what_if import parse_number
 
 LEAST_PHASE = 5e-3
 """Shortest phase [s] that can be set by hand; only the torque phase may be empty."""

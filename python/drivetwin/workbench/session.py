@@ -6,10 +6,11 @@ from __future__ import annotations
 import secrets
 import shutil
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import wraps
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Concatenate, ParamSpec, TypeVar
 
 from drivetwin._util.atomic import write_text
 from drivetwin.authoring.card_text import EntryPath, refuse_faults, replace_numbers
@@ -29,8 +30,8 @@ from drivetwin.workbench.forms import CardForm, Corrections, Entry, apply_entrie
 from drivetwin.workbench.identifying import Boundary, Task, identify_bus_logs, identify_logs
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
 from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
+from drivetwin.workbench.what_if import View
 from drivetwin.workbench.workspace import Folder
-from drivetwin.workbench.zoom import View
 
 MOST_UPLOADS = 8
 """Maximum number of uploads of a session; the oldest one that is not open is deleted.
@@ -46,6 +47,23 @@ class Live:
     identified: Validation
     present: Validation
     figure: Figure
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def _hold_lock(
+    method: Callable[Concatenate[Session, P], R],
+) -> Callable[Concatenate[Session, P], R]:
+    """Return a method during which the lock of its session is held."""
+
+    @wraps(method)
+    def locked(self: Session, /, *args: P.args, **kwargs: P.kwargs) -> R:
+        with self.lock:
+            return method(self, *args, **kwargs)
+
+    return locked
 
 
 @dataclass(eq=False)
@@ -87,123 +105,122 @@ class Session:
         path = self.folder.get_file(name)
         return Source(self.folder.get_name(path), path)
 
+    @_hold_lock
     def open(self, log: Source, card: Source | None = None, mapping: Path | None = None) -> None:
         """Open a log, with its card if there is one; discard the work on the previous logs.
 
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
-        with self.lock:
-            fresh = self._read_log(log, card, mapping, Corrections())
-            self.cancel()
-            self._set(SessionState(logs=(fresh,), card=card))
-            self.form = None
+        fresh = self._read_log(log, card, mapping, Corrections())
+        self.cancel()
+        self._set(SessionState(logs=(fresh,), card=card))
+        self.form = None
 
     def open_log(self, log: Source) -> None:
         """Open a log with the card that is open, if any; see `open`."""
         self.open(log, self.work.card)
 
+    @_hold_lock
     def add_log(self, log: Source) -> None:
         """Open a log of the same vehicle beside the others, read as the selected one is mapped.
 
         Raises InputError for a log that is open or one too many, and the errors of the readers.
         """
-        with self.lock:
-            work, like = self.work, self.work.require_open_log()
-            if log.name in (one.source.name for one in work.logs):
-                raise InputError(f"a log called {log.name} is open", "rename one of them")
-            if len(work.logs) >= MOST_LOGS:
-                raise InputError(
-                    f"{MOST_LOGS} logs are open, which is the limit", "remove one in the step Log"
-                )
-            fresh = self._read_log(log, work.card, like.mapping, like.corrections)
-            self.cancel()
-            self._set(replace(work, logs=(*work.logs, fresh)).drop_results())
+        work, like = self.work, self.work.require_open_log()
+        if log.name in (one.source.name for one in work.logs):
+            raise InputError(f"a log called {log.name} is open", "rename one of them")
+        if len(work.logs) >= MOST_LOGS:
+            raise InputError(
+                f"{MOST_LOGS} logs are open, which is the limit", "remove one in the step Log"
+            )
+        fresh = self._read_log(log, work.card, like.mapping, like.corrections)
+        self.cancel()
+        self._set(replace(work, logs=(*work.logs, fresh)).drop_results())
 
+    @_hold_lock
     def remove_log(self, index: int) -> None:
         """Close one of several logs. Raises InputError."""
-        with self.lock:
-            work = self.work.remove_log(index)
-            self.cancel()
-            self._set(work)
+        work = self.work.remove_log(index)
+        self.cancel()
+        self._set(work)
 
+    @_hold_lock
     def select_log(self, index: int) -> None:
         """Select the log that the views show. Raises InputError."""
-        with self.lock:
-            self._set(self.work.select_log(index))
+        self._set(self.work.select_log(index))
 
+    @_hold_lock
     def hold_out(self, held: Sequence[frozenset[int]]) -> None:
         """Set the indices of the shifts to predict, log by log. Raises InputError."""
-        with self.lock:
-            self.work = self.work.hold_out(held)
+        self.work = self.work.hold_out(held)
 
+    @_hold_lock
     def open_card(self, card: Source) -> None:
         """Open a card for the open logs; results on another card are discarded.
 
         Raises the typed errors of the readers; the work stays as it was then, and goes on.
         """
-        with self.lock:
-            self.work.require_opened()
-            logs = tuple(
-                self._read_log(one.source, card, one.mapping, one.corrections)
-                for one in self.work.logs
-            )
-            self.cancel()
-            self._set(replace(self.work, logs=logs, card=card, locks={}, shift=0).drop_results())
+        self.work.require_opened()
+        logs = tuple(
+            self._read_log(one.source, card, one.mapping, one.corrections) for one in self.work.logs
+        )
+        self.cancel()
+        self._set(replace(self.work, logs=logs, card=card, locks={}, shift=0).drop_results())
 
     def open_sample(self) -> None:
         """Open a synthetic log with its card, as an example."""
         log, card = write_sample(self.scratch)
         self.open(Source(log.name, log, uploaded=True), Source(card.name, card, uploaded=True))
 
+    @_hold_lock
     def read_column(self, index: int) -> Preview:
         """Read the column `index` of the survey as recorded. Raises InputError without numbers."""
-        with self.lock:
-            one = self.work.require_open_log()
-            key = make_column_key(one.opened.survey, index)
-            if self.preview is None or self.preview[0] != key:
-                corrections = Corrections(time_unit=one.corrections.time_unit)
-                request = _make_request(one.source, self.work.card, one.mapping, corrections)
-                limit = compute_parser_limits(request.log).seconds
-                preview = jobs.call(sandboxed_parse.read_column, request, key, limit=limit)
-                self.preview = (key, preview)
-            return self.preview[1]
+        one = self.work.require_open_log()
+        key = make_column_key(one.opened.survey, index)
+        if self.preview is None or self.preview[0] != key:
+            corrections = Corrections(time_unit=one.corrections.time_unit)
+            request = _make_request(one.source, self.work.card, one.mapping, corrections)
+            limit = compute_parser_limits(request.log).seconds
+            preview = jobs.call(sandboxed_parse.read_column, request, key, limit=limit)
+            self.preview = (key, preview)
+        return self.preview[1]
 
+    @_hold_lock
     def begin_card(self) -> None:
         """Begin the form of a new card from the log. Raises the typed errors of the readers."""
-        with self.lock:
-            one = self.work.require_open_log()
-            request = _make_request(one.source, None, one.mapping, one.corrections)
-            surveyed: LogSurvey = jobs.call(
-                sandboxed_parse.survey_for_card,
-                request,
-                self.scratch / "mapping.toml",
-                limit=compute_parser_limits(request.log).seconds,
-            )
-            self.form = CardForm(surveyed)
-            self.form.fill_in({})
+        one = self.work.require_open_log()
+        request = _make_request(one.source, None, one.mapping, one.corrections)
+        surveyed: LogSurvey = jobs.call(
+            sandboxed_parse.survey_for_card,
+            request,
+            self.scratch / "mapping.toml",
+            limit=compute_parser_limits(request.log).seconds,
+        )
+        self.form = CardForm(surveyed)
+        self.form.fill_in({})
 
+    @_hold_lock
     def write_card(self, name: str, texts: Mapping[Key, str], *, can_replace: bool) -> Source:
         """Write the card of the form into the folder; over an existing file only if that may be.
 
         Raises InputError for open answers, RefusedError for a name that cannot be or exists.
         """
-        with self.lock:
-            if self.form is None:
-                raise InputError("no card is begun", "press Begin a card from the log first")
-            path = self.folder.make_new_path(name, ".toml")
-            self.form.file_name = path.name
-            self.form.fill_in({key: text for key, text in texts.items() if text})
-            return self._write_text(path, self.form.format_card(path.name), can_replace)
+        if self.form is None:
+            raise InputError("no card is begun", "press Begin a card from the log first")
+        path = self.folder.make_new_path(name, ".toml")
+        self.form.file_name = path.name
+        self.form.fill_in({key: text for key, text in texts.items() if text})
+        return self._write_text(path, self.form.format_card(path.name), can_replace)
 
+    @_hold_lock
     def write_edited_card(
         self, name: str, numbers: Mapping[EntryPath, str], *, can_replace: bool
     ) -> Source:
         """Write the open card with other numbers into the folder; see `write_card`."""
-        with self.lock:
-            path = self.folder.make_new_path(name, ".toml")
-            text = replace_numbers(self.read_card_text(), numbers)
-            refuse_faults(text, path.name)
-            return self._write_text(path, text, can_replace)
+        path = self.folder.make_new_path(name, ".toml")
+        text = replace_numbers(self.read_card_text(), numbers)
+        refuse_faults(text, path.name)
+        return self._write_text(path, text, can_replace)
 
     def read_card_text(self) -> str:
         """Return the text of the open vehicle card. Raises InputError without one."""
@@ -211,145 +228,145 @@ class Session:
         card = self.work.card
         return "" if card is None else card.path.read_text(encoding="utf-8-sig")
 
+    @_hold_lock
     def correct_mapping(self, entries: Sequence[Entry], time_unit: str = "") -> None:
         """Read the selected log again with the corrected mapping; discard the previous results.
 
         Raises MappingError, UnitError; the work stays as it was then, and goes on.
         """
-        with self.lock:
-            one = self.work.require_open_log()
-            corrections = apply_entries(one.opened.survey, entries, time_unit)
-            fresh = self._read_log(one.source, self.work.card, one.mapping, corrections)
-            self.cancel()
-            self._set(self.work.set_log(fresh))
+        one = self.work.require_open_log()
+        corrections = apply_entries(one.opened.survey, entries, time_unit)
+        fresh = self._read_log(one.source, self.work.card, one.mapping, corrections)
+        self.cancel()
+        self._set(self.work.set_log(fresh))
 
+    @_hold_lock
     def move_boundaries(self, index: int, changes: Mapping[Boundary, float]) -> None:
         """Set boundaries of a shift of the selected log; none: as detected. Raises InputError."""
-        with self.lock:
-            self._set(self.work.apply_moves(index, changes))
+        self._set(self.work.apply_moves(index, changes))
 
+    @_hold_lock
     def set_lock(self, parameter_id: str, lock: Lock) -> None:
         """Lock a parameter for the next identification. Raises InputError."""
-        with self.lock:
-            self.work = self.work.set_lock(parameter_id, lock)
+        self.work = self.work.set_lock(parameter_id, lock)
 
+    @_hold_lock
     def identify(self, *, is_quick: bool = False) -> None:
         """Start the identification in a separate process; with `is_quick` of one model alone.
 
         Raises InputError on failure.
         """
-        with self.lock:
-            if self.job is not None:
-                raise InputError("an identification is running", "wait for it or cancel it")
-            work = self.work
-            if work.ratios is not None:
-                bus = work.build_bus_task()
-                self._set(work.drop_results())
-                self.job = jobs.start(identify_bus_logs, bus)
-                return
-            task = Task(work.build_sources(), work.apply_locks_to_card(), is_quick)
+        if self.job is not None:
+            raise InputError("an identification is running", "wait for it or cancel it")
+        work = self.work
+        if work.ratios is not None:
+            bus = work.build_bus_task()
             self._set(work.drop_results())
-            self.job = jobs.start(identify_logs, task)
+            self.job = jobs.start(identify_bus_logs, bus)
+            return
+        task = Task(work.build_sources(), work.apply_locks_to_card(), is_quick)
+        self._set(work.drop_results())
+        self.job = jobs.start(identify_logs, task)
 
+    @_hold_lock
     def collect_job_results(self) -> bool:
         """Take in what the job has found; True where something came or it ended."""
-        with self.lock:
-            if self.job is None:
-                return False
-            results = self.job.get_results()
-            for result in results:
-                self._set(self.work.add_result(result))
-            if not self.job.finished:
-                return bool(results)
-            fault, self.job = self.job.fault, None
-            if fault is not None:
-                error = fault.to_error()
-                self._set(replace(self.work, ended=error.format_for_shell()))
-                raise error
-            return True
+        if self.job is None:
+            return False
+        results = self.job.get_results()
+        for result in results:
+            self._set(self.work.add_result(result))
+        if not self.job.finished:
+            return bool(results)
+        fault, self.job = self.job.fault, None
+        if fault is not None:
+            error = fault.to_error()
+            self._set(replace(self.work, ended=error.format_for_shell()))
+            raise error
+        return True
 
+    @_hold_lock
     def cancel(self) -> None:
         """Stop the running job, if any; results that have come in stay."""
-        with self.lock:
-            if self.job is not None:
-                self.job.cancel()
-                self.job = None
+        if self.job is not None:
+            self.job.cancel()
+            self.job = None
 
+    @_hold_lock
     def choose_shift(self, index: int) -> None:
         """Select another shift of the log. Raises InputError if it does not exist."""
-        with self.lock:
-            if not 0 <= index < len(self.work.shifts):
-                raise InputError("there is no such shift", "choose one that is listed")
-            self._set(replace(self.work, shift=index, changes={}))
+        if not 0 <= index < len(self.work.shifts):
+            raise InputError("there is no such shift", "choose one that is listed")
+        self._set(replace(self.work, shift=index, changes={}))
 
+    @_hold_lock
     def reset_sliders(self) -> None:
         """Set all sliders to the identified values."""
-        with self.lock:
-            self._set(replace(self.work, changes={}))
+        self._set(replace(self.work, changes={}))
 
+    @_hold_lock
     def set_view(self, view: View) -> bool:
         """Note the time window that was zoomed to.
 
         Returns True if another shift was selected: the only one in the window, unless sliders of
         the selected one were moved.
         """
-        with self.lock:
-            inside = [
-                k for k, one in enumerate(self.work.shifts) if view[0] <= one.lockup_time <= view[1]
-            ]
-            can_select = len(inside) == 1 and not self.work.changes
-            is_other = can_select and inside[0] != self.work.shift
-            if is_other:
-                self._set(replace(self.work, shift=inside[0]))
-            self.view = view
-            return is_other
+        inside = [
+            k for k, one in enumerate(self.work.shifts) if view[0] <= one.lockup_time <= view[1]
+        ]
+        can_select = len(inside) == 1 and not self.work.changes
+        is_other = can_select and inside[0] != self.work.shift
+        if is_other:
+            self._set(replace(self.work, shift=inside[0]))
+        self.view = view
+        return is_other
 
+    @_hold_lock
     def get_simulation(self) -> Live:
         """Run and figure at the present sliders. Raises what the simulation needs and lacks."""
-        with self.lock:
-            if self.live is None:
-                work = self.work = replace(self.work, has_viewed=True)
-                twin, log = work.require_twin(), work.require_log()
-                identified = what_if.simulate_identified(twin, log, work.require_shift())
-                present = what_if.simulate_changes(identified, twin, log, work.changes)
-                self.live = Live(identified, present, what_if.plot_what_if(identified, present))
-            return self.live
+        if self.live is None:
+            work = self.work = replace(self.work, has_viewed=True)
+            twin, log = work.require_twin(), work.require_log()
+            identified = what_if.simulate_identified(twin, log, work.require_shift())
+            present = what_if.simulate_changes(identified, twin, log, work.changes)
+            self.live = Live(identified, present, what_if.plot_what_if(identified, present))
+        return self.live
 
+    @_hold_lock
     def apply_sliders(self, changes: Mapping[str, float]) -> dict[int, dict[str, Any]]:
         """Simulate with other parameters (SI); returns what changes in the figure, by trace."""
-        with self.lock:
-            live, work = self.get_simulation(), self.work
-            present = what_if.simulate_changes(
-                live.identified, work.require_twin(), work.require_log(), changes
-            )
-            self.work = replace(work, changes=dict(changes))
-            self.live = replace(live, present=present)
-            return what_if.collect_changed_curves(live.figure, present, self.view)
+        live, work = self.get_simulation(), self.work
+        present = what_if.simulate_changes(
+            live.identified, work.require_twin(), work.require_log(), changes
+        )
+        self.work = replace(work, changes=dict(changes))
+        self.live = replace(live, present=present)
+        return what_if.collect_changed_curves(live.figure, present, self.view)
 
+    @_hold_lock
     def note_export(self) -> None:
         """Record that the result was exported."""
-        with self.lock:
-            self.work = replace(self.work, has_exported=True)
+        self.work = replace(self.work, has_exported=True)
 
+    @_hold_lock
     def save(self, name: str) -> str:
         """Save the workspace in the folder; returns the name it has there."""
-        with self.lock:
-            path = self.folder.make_new_path(name, workspace.ENDING)
-            workspace.save_workspace(self.work, path, self.folder)
-            return self.folder.get_name(path)
+        path = self.folder.make_new_path(name, workspace.ENDING)
+        workspace.save_workspace(self.work, path, self.folder)
+        return self.folder.get_name(path)
 
+    @_hold_lock
     def reopen(self, source: Source) -> None:
         """Go on with a saved workspace. Raises RefusedError, and the errors of log and card."""
-        with self.lock:
-            content = workspace.load_workspace(source.path, source.name)
-            logs, card = workspace.locate_sources(content, self.folder, source.name)
-            read = tuple(
-                self._read_log(one, card, None, entry.to_corrections())
-                for one, entry in zip(logs, content.logs, strict=True)
-            )
-            work = workspace.restore_workspace(content, SessionState(logs=read, card=card))
-            self.cancel()
-            self._set(work)
+        content = workspace.load_workspace(source.path, source.name)
+        logs, card = workspace.locate_sources(content, self.folder, source.name)
+        read = tuple(
+            self._read_log(one, card, None, entry.to_corrections())
+            for one, entry in zip(logs, content.logs, strict=True)
+        )
+        work = workspace.restore_workspace(content, SessionState(logs=read, card=card))
+        self.cancel()
+        self._set(work)
 
     def close(self) -> None:
         """Stop what runs and remove the scratch folder."""

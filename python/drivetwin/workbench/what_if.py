@@ -1,30 +1,99 @@
 # SPDX-License-Identifier: MIT
-"""Sliders: parameters changed by hand, and the simulation that follows."""
+"""Zoom of figures over time, and sliders with the simulation that follows them."""
 
 from __future__ import annotations
 
+import base64
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display, get_display_unit
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import make_link
 from drivetwin.report.figure import COMPARED, Figure, get_parameter_name
-from drivetwin.report.figures.stack import Curve, Panel, stack_panels
+from drivetwin.report.figures.stack import Curve, Panel, decimate_around, stack_panels
 from drivetwin.report.figures.validation import build_validation_panels
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS
-from drivetwin.simulation.dual_clutch import (
-    DualClutch,
-)
+from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.twin.distribution import scale_friction
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import rerun_shift, simulate_shift
-from drivetwin.workbench.zoom import View, encode_curves
+
+
+def parse_number(value: object) -> float | None:
+    """Return a finite number; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+View = tuple[float, float]
+"""First and last time [s] of a figure."""
+_TIME_RESOLUTION = 5e-5
+"""Largest step between the times that are sent [s]."""
+_VALUE_RESOLUTION = 1e-4
+"""Largest step between the values that are sent, over their range."""
+
+
+def parse_view(change: Mapping[str, object]) -> View | None:
+    """Return the time window of a relayout event [s]; None if the window did not change."""
+    both = change.get("xaxis.range")
+    ends = both if isinstance(both, list) else [change.get(f"xaxis.range[{k}]") for k in (0, 1)]
+    numbers = [number for one in ends if (number := parse_number(one)) is not None]
+    if len(numbers) != 2 or numbers[0] >= numbers[1]:
+        return None
+    return numbers[0], numbers[1]
+
+
+def collect_curves(panels: Sequence[Panel], view: View) -> dict[int, dict[str, Any]]:
+    """Collect x and y of every trace of stacked panels, fine in `view`, by trace index."""
+    pairs = ((panel.display, curve) for panel in panels for curve in panel.curves)
+    return encode_curves(enumerate(pairs), view)
+
+
+def encode_curves(
+    curves: Iterable[tuple[int, tuple[Display, Curve]]], view: View
+) -> dict[int, dict[str, Any]]:
+    """Encode curves by trace index.
+
+    They are packed (`dtype`, `bdata` in base64), as formatting digits would take half of the time.
+    """
+    found = {}
+    for place, (display, curve) in curves:
+        time, recorded = decimate_around(curve.time, curve.values, view)
+        values = display.to_display(recorded)
+        known = values[np.isfinite(values)]
+        span = np.ptp(known) if known.size else 0.0
+        found[place] = {
+            "x": _encode(time, _TIME_RESOLUTION),
+            "y": _encode(values, _VALUE_RESOLUTION * span),
+        }
+    return found
+
+
+def _encode(values: FloatArray, resolution: float) -> dict[str, str]:
+    """Encode an array as plotly.js reads it without a number being spelled out.
+
+    Single precision is used where its steps are at most the `resolution`.
+    """
+    largest = np.abs(values).max(initial=0.0, where=np.isfinite(values))
+    is_single = np.spacing(np.float32(largest)) <= resolution
+    kind = "f4" if is_single else "f8"
+    packed = base64.b64encode(values.astype(f"<{kind}").tobytes()).decode()
+    return {"dtype": kind, "bdata": packed}
+
 
 BESIDE_MODEL = ("te_delay", *ADDED_ELEMENT_IDS)
 """Parameters of a simulation that the dual-clutch model does not have."""

@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.calibration.guarded_controller import run_guarded
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policies.slip import HEADER
 from drivetwin.errors import ControllerError
 from drivetwin.export.compiler import compile_library

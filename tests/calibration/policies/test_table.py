@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.calibration.metrics import Metric
-from drivetwin.calibration.policies.kind import PolicyKind
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.torque_balance import estimate_slip_pressures
 from drivetwin.errors import InputError
 from drivetwin.simulation.dual_clutch import Signal

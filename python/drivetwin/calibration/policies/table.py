@@ -10,11 +10,11 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.maneuver import Maneuver, Profiles
+from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policies.controller import (
     build_controller_policy,
     build_inertia_first_policy,
 )
-from drivetwin.calibration.policies.kind import PolicyKind
 from drivetwin.calibration.policies.slip import UserController, build_own_policy, build_slip_policy
 from drivetwin.calibration.policy import Policy, PolicyParameter, Space
 from drivetwin.errors import InputError

@@ -11,13 +11,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from drivetwin._util.atomic import write_text
 from drivetwin.errors import InputError
 from drivetwin.export.entries import Subject
+from drivetwin.export.fmu.build import Experiment
 from drivetwin.export.modelica.elements import build_part
 from drivetwin.export.modelica.inputs import (
     ROTATIONAL,
@@ -38,10 +38,6 @@ from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, FloatArray, Signal
 from drivetwin.simulation.element_schema import GROUND, list_ports
 from drivetwin.simulation.network import Element, Start
-
-if TYPE_CHECKING:
-    from drivetwin.export.fmu.build import Experiment
-
 
 MSL_VERSION = "4.0.0"
 _FLANGE = f"{ROTATIONAL}.Interfaces.Flange_a"

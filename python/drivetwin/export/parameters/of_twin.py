@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.constants import zero_Celsius
@@ -17,6 +16,7 @@ from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.maneuver import ClosedLoop, OperatingPoint
 from drivetwin.calibration.operating_map import OperatingMap
 from drivetwin.calibration.policy import PolicyParameter
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.export.parameters.content import (
     Axis,
     Curve,
@@ -27,15 +27,9 @@ from drivetwin.export.parameters.content import (
 )
 from drivetwin.export.targets import Names
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
-from drivetwin.simulation.dual_clutch import Signal
-from drivetwin.twin.twin import build_friction_law
-
-if TYPE_CHECKING:
-    from drivetwin.estimation.result.estimate import Estimate
-    from drivetwin.simulation.added_elements import Converter
-    from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Stribeck
-    from drivetwin.twin.twin import Twin, TwinElement
-
+from drivetwin.simulation.added_elements import Converter
+from drivetwin.simulation.dual_clutch import FloatArray, FrictionTable, Signal, Stribeck
+from drivetwin.twin.twin import Twin, TwinElement, build_friction_law
 
 _CURVES = {
     "engine_torque": ("N*m", "engine torque demand"),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +21,7 @@ from drivetwin.export.parameters.content import (
 )
 from drivetwin.export.parameters.of_twin import DESIGN_FIELDS, LAW_FIELDS, collect_parameters
 from drivetwin.parameters import FINAL_DRIVE, get_parameter_spec, is_ratio, make_ratio_id
-from drivetwin.twin.twin import SIMULATED
-
-if TYPE_CHECKING:
-    from drivetwin.twin.twin import Twin
+from drivetwin.twin.twin import SIMULATED, Twin
 
 METHOD = "parameter file"
 _DIVISORS = ("k_o", "i_in", "i_f", "i_c", "i_out")

@@ -23,13 +23,13 @@ from drivetwin.channels.roles import Column, ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import get_time_factor, is_time_unit
 from drivetwin.errors import DamagedChannelError, FileFormatError, MissingChannelError, Where
+from drivetwin.logs.formats.can.database import Frames
 from drivetwin.logs.formats.can.open import (
     decode_recording,
     has_only_frames,
     read_attached_databases,
     read_bus_frames,
 )
-from drivetwin.logs.formats.frames import Frames
 from drivetwin.logs.formats.mdf_conversion import (
     ConversionError,
     Converted,

@@ -5,16 +5,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from drivetwin._util.display_units import BAR
+from drivetwin.logs.survey import Column
 from drivetwin.report.blocks import TableBlock, make_table
-
-if TYPE_CHECKING:
-    from drivetwin.logs.survey import Column
-    from drivetwin.vehicle.card import RatioCard
-    from drivetwin.vehicle.spec import PriorValue
-    from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import RatioCard
+from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 def build_column_table(

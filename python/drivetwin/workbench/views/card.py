@@ -26,7 +26,7 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import ControlId
-from drivetwin.workbench.views.sources import (
+from drivetwin.workbench.views.log import (
     build_file_buttons,
     format_source,
     register_opening,

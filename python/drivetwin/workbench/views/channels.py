@@ -24,7 +24,7 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import Index
-from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
+from drivetwin.workbench.views.log import Place, build_log_choice, register_log_choice
 from drivetwin.workbench.views.widgets import render_table
 
 _PREVIEW_HEIGHT = 330

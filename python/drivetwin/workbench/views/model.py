@@ -23,7 +23,7 @@ from drivetwin.workbench.views import locks
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
-from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
+from drivetwin.workbench.views.log import Place, build_log_choice, register_log_choice
 from drivetwin.workbench.views.stepper import Step
 from drivetwin.workbench.views.widgets import render_table
 from drivetwin.workbench.what_if import (

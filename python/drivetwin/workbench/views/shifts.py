@@ -31,7 +31,7 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog, SessionState
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import ControlId, Index
-from drivetwin.workbench.views.sources import Place, build_log_choice, register_log_choice
+from drivetwin.workbench.views.log import Place, build_log_choice, register_log_choice
 from drivetwin.workbench.views.widgets import render_table
 
 

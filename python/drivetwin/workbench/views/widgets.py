@@ -40,8 +40,8 @@ from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views.fields import check_fields
+from drivetwin.workbench.what_if import collect_curves, parse_view
 from drivetwin.workbench.workspace import LIMITS
-from drivetwin.workbench.zoom import collect_curves, parse_view
 
 P = ParamSpec("P")
 R = TypeVar("R")

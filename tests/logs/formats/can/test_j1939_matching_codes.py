@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivetwin.logs.formats.can.database import Signal
 from drivetwin.logs.formats.can.j1939 import check_codes
-from drivetwin.logs.formats.frames import Signal
 
 
 def counts(signal: Signal, *raw: int) -> tuple[int, int, int, int]:

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivetwin.logs.formats.can.database import build_frames
 from drivetwin.logs.formats.can.j1939 import assemble_messages
-from drivetwin.logs.formats.frames import build_frames
 
 EC1 = 65251
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from drivetwin.channels.roles import Column, Quantity
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.errors import DamagedChannelError, Where
-from drivetwin.logs.formats.frames import Frames, Message, Signal
+from drivetwin.logs.formats.can.database import Frames, Message, Signal
 from drivetwin.logs.raw import RawChannel, Recording, Window
 
 _PDU1_BELOW = 240

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError, Where
-from drivetwin.logs.formats.frames import (
+from drivetwin.logs.formats.can.database import (
     FD_LENGTHS,
     LARGEST_IDENTIFIER,
     LONGEST,

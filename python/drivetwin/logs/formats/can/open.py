@@ -18,14 +18,6 @@ from drivetwin.channels.roles import ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError, Where
 from drivetwin.logs.formats.can.database import (
-    load_driveline_messages,
-    parse_database,
-    read_database,
-)
-from drivetwin.logs.formats.can.j1939 import match_groups
-from drivetwin.logs.formats.can.recording import BusRecording
-from drivetwin.logs.formats.can.texts import read_bus_text
-from drivetwin.logs.formats.frames import (
     EXTENDED_BIT,
     FD_LENGTHS,
     LARGEST_IDENTIFIER,
@@ -34,7 +26,13 @@ from drivetwin.logs.formats.frames import (
     Frames,
     build_frames,
     describe_left_out,
+    load_driveline_messages,
+    parse_database,
+    read_database,
 )
+from drivetwin.logs.formats.can.j1939 import match_groups
+from drivetwin.logs.formats.can.recording import BusRecording
+from drivetwin.logs.formats.can.texts import read_bus_text
 from drivetwin.logs.raw import Recording, subtract_origin
 
 DATA_FRAME = "CAN_DataFrame"

@@ -15,6 +15,11 @@ from drivetwin.channels.roles import BusOptions, Column
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import DamagedChannelError, MissingChannelError, Where
 from drivetwin.logs.formats.can.database import (
+    FEW_EARLIER,
+    MOST_EARLIER,
+    Frames,
+    Message,
+    Signal,
     decode_codes,
     decode_physical,
     find_faults,
@@ -45,7 +50,6 @@ from drivetwin.logs.formats.can.j1939 import (
     get_group,
 )
 from drivetwin.logs.formats.code_texts import describe_faults
-from drivetwin.logs.formats.frames import FEW_EARLIER, MOST_EARLIER, Frames, Message, Signal
 from drivetwin.logs.raw import MIN_SAMPLES, RawChannel, Window
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivetwin.errors import FileFormatError, Where
+from drivetwin.logs.formats.can.database import PAYLOAD, Frames
 from drivetwin.logs.formats.can.line_format import LineFormat, read_lines
-from drivetwin.logs.formats.frames import PAYLOAD, Frames
 from drivetwin.logs.raw import HEAD_BYTES
 
 BOM = b"\xef\xbb\xbf"

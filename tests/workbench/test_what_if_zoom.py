@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from drivetwin.workbench.zoom import parse_view
+from drivetwin.workbench.what_if import parse_view
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from drivetwin.authoring.sensor_classes import read_sensor_classes
+from drivetwin.authoring.element_questions import read_sensor_classes
 from drivetwin.vehicle.card_fields import get_card_field
 
 
