@@ -22,18 +22,18 @@ def twin_file(tmp_path: Path) -> Path:
     return path
 
 
-def test_names_converter_and_default_path(
+def test_names_and_default_path(
     twin_file: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    arguments = ["--to", "m", "--names", "simscape", "--powertrain", "truck-324kw", "--json"]
+    arguments = ["--to", "m", "--names", "simscape", "--json"]
     assert main(["export", str(twin_file), *arguments]) == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["file"] == "truck.m"
-    assert {"Aeff.B3", "mu_k.B3", "tc_capacity_factor"} <= set(reported["parameters"])
+    assert {"Aeff.B3", "mu_k.B3"} <= set(reported["parameters"])
     area = read_parameters(tmp_path / "truck.m")["Aeff_B3"]
     assert isinstance(area, Scalar)
     assert area.value == 2.7e-2

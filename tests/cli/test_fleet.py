@@ -21,13 +21,13 @@ COUNT = 8
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A store of a few made logs, one of them empty, with single reports and traces."""
+    """A store of a few made logs, one of them empty, with single reports."""
     folder = tmp_path_factory.mktemp("fleet")
     make_fleet(folder / "logs", COUNT)
     (folder / "logs" / "unit_07" / "empty_at_1.0_Mm.csv").write_bytes(b"")
     command = ["fleet", str(folder / "logs"), "--vehicle", str(folder / "logs" / "rules.toml")]
     command += ["-o", str(folder / "store"), "--quick", "--workers", "1"]
-    assert main([*command, "--reports", "--traces"]) == 0
+    assert main([*command, "--reports"]) == 0
     return folder
 
 
@@ -80,7 +80,6 @@ def test_the_report_links_to_single_ones_with_one_library(
     singles = list((fleet / "store" / "reports").glob("*.html"))
     assert len(singles) == COUNT
     assert all('src="plotly.js"' in single.read_text("utf-8") for single in singles)
-    assert len(list((fleet / "store" / "traces").glob("*.parquet"))) == COUNT
 
 
 @pytest.mark.parametrize("place", ["store/again.html", "elsewhere.html"])
@@ -115,7 +114,7 @@ def test_logs_of_other_settings_are_told(
     fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     store = tmp_path / "store"
-    shutil.copytree(fleet / "store", store, ignore=shutil.ignore_patterns("reports", "traces"))
+    shutil.copytree(fleet / "store", store, ignore=shutil.ignore_patterns("reports"))
     with closing(sqlite3.connect(store / "index.sqlite")) as index, index:
         index.execute("UPDATE logs SET settings = 'older' WHERE log = (SELECT min(log) FROM logs)")
     assert main(["fleet", "estimate", str(store)]) == 0

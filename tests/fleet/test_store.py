@@ -106,7 +106,7 @@ def test_what_a_stopped_compaction_left_is_no_harm(tmp_path: Path) -> None:
         assert not _files(store)
 
 
-@pytest.mark.parametrize("folder", ["inbox/00", "reports", "traces"])
+@pytest.mark.parametrize("folder", ["inbox/00", "reports"])
 def test_no_half_written_file_stays(tmp_path: Path, folder: str) -> None:
     half = tmp_path / "a" / folder / "x.html.host.1.partial"
     with Store(tmp_path / "a", write=True):

@@ -46,7 +46,7 @@ from drivetwin.vehicle.card import RATIO_TOLERANCE
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ConverterTable
 
-_TABLE = Path(__file__).with_suffix(".toml")
+_TABLE = Path(__file__).with_name("sensor_classes.toml")
 
 UNITS = {Quantity.TORQUE: "Nm", Quantity.SPEED: "rpm", Quantity.PRESSURE: "bar"}
 """Unit of offset tolerances on a card, and suffix of their keys."""

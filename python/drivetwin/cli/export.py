@@ -43,13 +43,13 @@ def _list_unused(to: Target) -> set[str]:
     of_fmu = {"fmi", "platforms"}
     if not to.is_model:
         return of_models | of_fmu
-    of_parameters = {"names", "powertrain", "template"}
+    of_parameters = {"names", "template"}
     return of_parameters if to is Target.FMU else of_parameters | of_fmu
 
 
 def _export_estimates(made: MadeResult, request: Export, path: Path) -> Outcome:
     """Write the estimates of a result that has no twin."""
-    request.refuse_stated({"names", "powertrain"}, "the result has no clutches of a shift")
+    request.refuse_stated({"names"}, "the result has no clutches of a shift")
     estimates = made.estimates
     content = collect_estimates(made.file.parent.name, estimates, [made.describe_origin()])
     unvalued = [name for name, one in estimates.items() if one.value is None]

@@ -91,10 +91,6 @@ class ExportOptions(Request):
     names: Names = option(
         "For parameter files: naming convention of the parameters.", default=Names.DRIVETWIN
     )
-    powertrain: str | None = option(
-        "For parameter files: add the torque converter of this powertrain (TOML or built-in).",
-        metavar="FILE",
-    )
     template: Path | None = input_file(
         "For parameter files: template with labels, units, axes and breakpoints (TOML)."
     )

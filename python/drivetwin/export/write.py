@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivetwin.drive import load_powertrain
 from drivetwin.export.c import write_c
 from drivetwin.export.entries import Subject
 from drivetwin.export.fmu.build import BuildOptions, Experiment, build_fmu
@@ -59,10 +58,8 @@ def write_export(
 
 def _write_twin_parameters(twin: Twin, options: ExportOptions, path: Path) -> ParameterSet:
     """Write the parameters of a twin; return them."""
-    powertrain = options.powertrain
-    converter = None if powertrain is None else load_powertrain(powertrain).converter
     unvalued = [one.id for one in twin.parameters.values() if one.value is None]
-    content = collect_parameters(twin, options.names, converter)
+    content = collect_parameters(twin, options.names)
     return write_content(content, unvalued, options, path)
 
 

@@ -111,7 +111,7 @@ class Coordinator:
         while self._later and self._later[0][0] <= monotonic():
             task = heapq.heappop(self._later)[2]
             outcome = self._store.read_part_outcome(task.log)
-            if outcome is None or self._store.has_missing_files(task):
+            if outcome is None or self._store.is_report_missing(task):
                 return task
             self._record_completion(task, Completed(outcome, 0.0))
         return None
@@ -157,11 +157,9 @@ class Coordinator:
 
     def _build_task(self, file: FileRow, recipe: TaskSpec, members: Sequence[Member]) -> Task:
         store, log = self._store, file.log
-        has_traces = self._options.traces and not members  # bus logs have no simulation
         return Task(
             log, file.path, file.content, recipe, str(store.get_part_path(log)),
             report=str(store.get_report_path(log)) if self._options.reports else None,
-            traces=str(store.get_traces_path(log)) if has_traces else None,
             members=tuple(members),
         )  # fmt: skip
 
@@ -175,12 +173,12 @@ class Coordinator:
         if state is State.WAITING:
             outcome = self._store.read_part_outcome(log)
             if outcome is None or (
-                outcome.state is State.DONE and self._store.has_missing_files(task)
+                outcome.state is State.DONE and self._store.is_report_missing(task)
             ):
                 return False
             self._record_outcome(log, [file], Completed(outcome, 0.0), computed=False)
             return True
-        if state is State.DONE and self._store.has_missing_files(task):
+        if state is State.DONE and self._store.is_report_missing(task):
             return False
         self._notify_outcome(file, self._index.get_outcome(log), 0.0, computed=False)
         return True

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.atomic import write_bytes
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.channels.roles import ReadOptions
 from drivetwin.channels.shiftlog import ShiftLog
@@ -70,27 +68,6 @@ def _save_page(path: Path, page: Page) -> None:
     if not library.is_file():
         save_library(library)
     save_page(path, page, LIBRARY)
-
-
-def save_traces(path: Path, found: Identification) -> None:
-    """Write simulation over measurement as a Parquet table: shift, signal, time [s], values SI."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    columns: dict[str, list[object]] = {"shift": [], "signal": []}
-    numbers: dict[str, list[np.ndarray[tuple[int], np.dtype[np.float64]]]] = {
-        "time": [], "measured": [], "simulated": [],
-    }  # fmt: skip
-    for number, validation in enumerate(found.evidence.validation):
-        for signal, trace in validation.traces.items():
-            columns["shift"] += [number] * trace.time.size
-            columns["signal"] += [signal] * trace.time.size
-            for name, parts in numbers.items():
-                parts.append(getattr(trace, name))
-    values = {name: np.concatenate([np.empty(0), *parts]) for name, parts in numbers.items()}
-    buffer = BytesIO()
-    pq.write_table(pa.table({**columns, **values}), buffer, compression="zstd")
-    write_bytes(path, buffer.getvalue())
 
 
 _LAW_SIZE = P0
@@ -152,11 +129,11 @@ _CARDS = 64
 
 
 def identify_log(task: Task) -> Found:
-    """Identify one log, and write what is wanted besides its rows.
+    """Identify one log, and write its report where one is wanted.
 
     Raises the typed errors of each stage for a log that cannot be used, StoreError where the report
-    or the traces cannot be written or the card is another by now, OSError where the drive fails
-    that the log is on.
+    cannot be written or the card is another by now, OSError where the drive fails that the log is
+    on.
     """
     recipe = task.recipe
     _check_inputs(recipe)  # before, for what is broken by now is not the log's fault
@@ -180,7 +157,9 @@ def identify_log(task: Task) -> Found:
         found = identify(log, card, found_shifts, recipe.method)
     twin = build_twin(found, card)
     found = attach_validation(found, twin, log)
-    _write_artefacts(task, found, log)
+    if task.report is not None:
+        with convert_write_errors():
+            _save_page(Path(task.report), build_report_page(found, log))
     rows = [*_compute_channel_means(task, mapping), *make_result_rows(found, card, recipe.mu_slip)]
     return Found(rows, make_shift_rows(found_shifts))
 
@@ -203,16 +182,6 @@ def _check_inputs(recipe: TaskSpec) -> None:
             "run the same command again: logs identified with the old ones are identified anew",
             Where(file=recipe.vehicle),
         )
-
-
-def _write_artefacts(task: Task, found: Identification, log: ShiftLog) -> None:
-    """Write the report and the traces that are wanted besides. Raises StoreError."""
-    if task.report is not None:
-        with convert_write_errors():
-            (_save_page(Path(task.report), build_report_page(found, log)))
-    if task.traces is not None:
-        with convert_write_errors():
-            save_traces(Path(task.traces), found)
 
 
 def _compute_channel_means(task: Task, mapping: Path | None) -> Iterator[Row]:

@@ -28,4 +28,3 @@ class FleetOptions(Request):
     )
     retry: bool = flag("Retry the logs in quarantine.")
     reports: bool = flag("Also write the report of each log.")
-    traces: bool = flag("Also write measured and simulated signals of each log.")

@@ -257,7 +257,7 @@ def _make_shift_values(row: ShiftRow) -> tuple[object, ...]:
 
 
 _LOCK = "coordinator.lock"
-REPORTS, TRACES = "reports", "traces"
+REPORTS = "reports"
 
 
 class Store:
@@ -346,7 +346,7 @@ class Store:
 
     def _delete_unfinished(self) -> None:
         """Delete the half-written files of workers that were killed."""
-        for folder in (parts.INBOX, REPORTS, TRACES):
+        for folder in (parts.INBOX, REPORTS):
             for leftover in (self.folder / folder).rglob("*.partial"):
                 leftover.unlink(missing_ok=True)
 
@@ -365,15 +365,9 @@ class Store:
         """Return the path of a single log's report."""
         return self.folder / REPORTS / f"{log}.html"
 
-    def get_traces_path(self, log: str) -> Path:
-        """Return the path of a single log's traces."""
-        return self.folder / TRACES / f"{log}.parquet"
-
-    def has_missing_files(self, task: Task) -> bool:
-        """Return True if a requested report or trace file is missing."""
-        return any(
-            one is not None and not Path(one).is_file() for one in (task.report, task.traces)
-        )
+    def is_report_missing(self, task: Task) -> bool:
+        """Return True if a report is wanted and missing."""
+        return task.report is not None and not Path(task.report).is_file()
 
     def read_part_outcome(self, log: str) -> Outcome | None:
         """Read the outcome written by a worker, which may not be in the index yet."""

@@ -132,8 +132,8 @@ class Task:
     `members` are path and SHA-256 of all bus logs of one vehicle, which are identified together;
     empty for a log that is identified alone. The first one is at `path`.
 
-    `part` is the Parquet file to write, `report` the HTML page and `traces` the Parquet file of
-    simulation over measurement that are wanted besides; all absolute paths.
+    `part` is the Parquet file to write, `report` the HTML page that is wanted besides; both are
+    absolute paths.
     """
 
     log: str
@@ -142,7 +142,6 @@ class Task:
     recipe: TaskSpec
     part: str
     report: str | None = None
-    traces: str | None = None
     members: tuple[Member, ...] = ()
 
     def to_json(self) -> str:

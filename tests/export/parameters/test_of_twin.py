@@ -12,7 +12,6 @@ from drivetwin.drive import load_powertrain
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.export.parameters.content import Curve, Scalar
 from drivetwin.export.parameters.of_twin import collect_parameters
-from drivetwin.export.targets import Names
 from drivetwin.simulation.dual_clutch import Stribeck
 from tests.export.parameters.sample import twin
 
@@ -67,7 +66,7 @@ def test_the_curve_keeps_to_a_law_that_bends_near_zero_slip(v_s: float, mu_s: fl
 
 def test_a_converter_brings_two_curves_over_the_speed_ratio() -> None:
     converter = load_powertrain("truck-324kw").converter
-    content = collect_parameters(twin(), Names.DRIVETWIN, converter)
+    content = collect_parameters(replace(twin(), converter=converter))
     ratio, capacity = (
         one
         for one in content.curves

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,7 @@ CONVERTER = load_powertrain("truck-324kw").converter
 
 @pytest.fixture
 def named() -> ParameterSet:
-    return collect_parameters(twin(), Names.SIMSCAPE, CONVERTER)
+    return collect_parameters(replace(twin(), converter=CONVERTER), Names.SIMSCAPE)
 
 
 def _value(content: ParameterSet, name: str) -> float:

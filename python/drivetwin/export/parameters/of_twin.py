@@ -219,15 +219,12 @@ LAW_FIELDS = {
 """Numbers of a friction law: unit and meaning."""
 
 
-def collect_parameters(
-    twin: Twin, names: Names = Names.DRIVETWIN, converter: Converter | None = None
-) -> ParameterSet:
+def collect_parameters(twin: Twin, names: Names = Names.DRIVETWIN) -> ParameterSet:
     """All numbers of a twin that are known, and μ over slip of its elements.
 
-    Unidentified parameters have no entry and are listed in the notes. A `converter` map comes from
-    a powertrain file, because it is not identifiable with the lock-up clutch engaged.
+    Unidentified parameters have no entry and are listed in the notes. The map of a converter is
+    that of the vehicle card.
     """
-
     own = ParameterSet(
         name=to_one_line(twin.name),
         scalars=(
@@ -239,7 +236,7 @@ def collect_parameters(
         ),
         curves=(
             *_collect_friction(twin),
-            *(() if converter is None else build_converter_curves(converter)),
+            *(() if twin.converter is None else build_converter_curves(twin.converter)),
         ),
         notes=tuple(to_one_line(note) for note in _collect_notes(twin)),
     )
