@@ -25,7 +25,7 @@ from benchmarks.fit.problems import build_problem
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.likelihood.data.recorded_data import hold_ends
-from drivetwin.fit.fixed_numbers import Tolerance
+from drivetwin.fit.fixed_numbers import Source, Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
@@ -198,6 +198,9 @@ def fit_model(
         tolerances = {one.name: Tolerance(exact=True) for one in model.components}
         tolerances["gain"] = Tolerance(exact=True)
     else:
+        tolerances = {  # a moved number has other digits than the one that somebody wrote
+            one.name: Tolerance(one.std) for one in problem.fixed if one.source is Source.DIGITS
+        }
         drawn = read_channels(problem, drawn)
         move_fixed(problem, model, moves)
     inputs = {
