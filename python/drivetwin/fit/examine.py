@@ -12,7 +12,7 @@ from drivetwin.estimation.analysis.profile_likelihood import Profile, trace_prof
 from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
 from drivetwin.estimation.likelihood.fit import compute_covariance, invert_information
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.fit.profile import HeldCoordinate
+from drivetwin.fit.profile import hold_coordinate
 from drivetwin.fit.result import ModelFit
 
 REPEATS = 4
@@ -85,7 +85,7 @@ def compute_profile(found: ModelFit, unknown: str) -> Profile:
         raise InputError(f"the fit has no unknown {unknown!r}", f"choose one of {', '.join(names)}")
     one = found.sought[names.index(unknown)]
     covariance = compute_covariance(found.problem, found.normal, found.chi2)
-    profile = trace_profile(HeldCoordinate(found.minimum, covariance, names.index(unknown)))
+    profile = trace_profile(hold_coordinate(found.minimum, covariance, names.index(unknown)))
     if not one.is_positive:
         return profile
     (low, high), (least, most) = profile.interval, profile.linear

@@ -14,10 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.analysis.profile_likelihood import PROFILE, Profile, trace_profile
+from drivetwin.estimation.analysis.profile_likelihood import (
+    PROFILE,
+    HeldParameter,
+    Profile,
+    trace_profile,
+)
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.plant import Problem
@@ -38,59 +42,25 @@ class RiseSettings:
 RISE = RiseSettings()
 
 
-@dataclass(frozen=True, eq=False)
-class HeldCoordinate:
-    """Coordinate of a minimum, by its `place`, with the `covariance` (p, p) of all."""
-
-    minimum: OptimizeResult[Problem]
-    covariance: FloatArray
-    place: int
-
-    @property
-    def parameter(self) -> str:
-        """Name of the coordinate."""
-        return self.point.names[self.place]
-
-    @property
-    def problem(self) -> Problem:
-        """Objective with its weighting at the minimum."""
-        return self.minimum.problem
-
-    @property
-    def point(self) -> ParameterVector:
-        """Minimum."""
-        return self.minimum.point
-
-    @property
-    def cost(self) -> float:
-        """Q at the minimum."""
-        return self.minimum.normal.cost
-
-    @property
-    def estimate(self) -> float:
-        """Coordinate at the minimum."""
-        return float(self.point.values[self.place])
-
-    @property
-    def std(self) -> float:
-        """Standard deviation by the covariance."""
-        return float(np.sqrt(self.covariance[self.place, self.place]))
-
-    @property
-    def unit(self) -> float:
-        """Rise of Q that counts as one: the variance over that by the sensors' noise."""
-        inverse = invert_information(self.minimum.normal.information)
-        return float(self.std**2 / inverse[self.place, self.place])
-
-    def compute_value(self, point: ParameterVector) -> float:
-        """Compute the coordinate at `point`."""
-        return float(point.values[self.place])
-
-    def compute_gradient(self, point: ParameterVector) -> FloatArray:
-        """Compute its derivative (p,) by the coordinates."""
-        gradient = np.zeros(len(point.names))
-        gradient[self.place] = 1.0
-        return gradient
+def hold_coordinate(
+    minimum: OptimizeResult[Problem], covariance: FloatArray, place: int
+) -> HeldParameter:
+    """Hold a coordinate of a minimum, by its `place`, with the `covariance` (p, p) of all."""
+    point, variance = minimum.point, float(covariance[place, place])
+    inverse = invert_information(minimum.normal.information)
+    gradient = np.zeros(len(point.names))
+    gradient[place] = 1.0
+    return HeldParameter(
+        point.names[place],
+        minimum.problem,
+        point,
+        minimum.normal.cost,
+        float(point.values[place]),
+        float(np.sqrt(variance)),
+        variance / float(inverse[place, place]),
+        lambda other: float(other.values[place]),
+        lambda _: gradient,
+    )
 
 
 def trace_slow(
@@ -117,7 +87,7 @@ def trace_slow(
     for place in range(count):
         step = RISE.distance * inverse[:, place] / np.sqrt(inverse[place, place])
         if any(_is_slow(minimum, side * step) for side in (-1.0, 1.0)):
-            found[place] = trace_profile(HeldCoordinate(minimum, covariance, place))
+            found[place] = trace_profile(hold_coordinate(minimum, covariance, place))
     return found
 
 

@@ -10,9 +10,9 @@ point; its steps obey q(θ) = v by a Lagrange multiplier.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.likelihood.budget import REMEDY
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_variance_inflation
 from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
@@ -82,7 +81,7 @@ def compute_profile(found: Identification, parameter: str) -> Profile:
         raise InputError(
             f"the fit has no parameter {parameter!r}", f"choose one of {', '.join(values)}"
         )
-    held = _FixedParameter(fit, signals, list(values).index(parameter), parameter)
+    held = _hold_reported(fit, signals, list(values).index(parameter), parameter)
     if held.std == 0.0:
         raise InputError(
             f"{parameter} is fixed by design",
@@ -91,42 +90,24 @@ def compute_profile(found: Identification, parameter: str) -> Profile:
     return trace_profile(held)
 
 
-class HeldParameter(Protocol):
-    """Parameter of a minimum that is to be held at other values."""
+@dataclass(frozen=True, eq=False)
+class HeldParameter:
+    """Parameter of a minimum that is to be held at other values.
 
-    @property
-    def parameter(self) -> str:
-        """Its name."""
+    `problem` has the weighting at the minimum `point`, where Q is `cost`. `estimate` and `std` are
+    the value there and its standard deviation by the covariance; `unit` is the rise of Q that
+    counts as one. `compute_value` and `compute_gradient` (p,) are functions of the unknowns.
+    """
 
-    @property
-    def problem(self) -> LikelihoodObjective[Any]:
-        """Objective with the weighting at the minimum."""
-
-    @property
-    def point(self) -> ParameterVector:
-        """Minimum."""
-
-    @property
-    def cost(self) -> float:
-        """Q at the minimum."""
-
-    @property
-    def estimate(self) -> float:
-        """Value at the minimum."""
-
-    @property
-    def std(self) -> float:
-        """Standard deviation by the covariance."""
-
-    @property
-    def unit(self) -> float:
-        """Rise of Q that counts as one."""
-
-    def compute_value(self, point: ParameterVector) -> float:
-        """Compute the parameter at `point`."""
-
-    def compute_gradient(self, point: ParameterVector) -> FloatArray:
-        """Compute its derivative (p,) by the unknowns."""
+    parameter: str
+    problem: LikelihoodObjective[Any]
+    point: ParameterVector
+    cost: float
+    estimate: float
+    std: float
+    unit: float
+    compute_value: Callable[[ParameterVector], float]
+    compute_gradient: Callable[[ParameterVector], FloatArray]
 
 
 def trace_profile(held: HeldParameter) -> Profile:
@@ -163,55 +144,31 @@ def get_likelihood_fit(found: Identification) -> tuple[LikelihoodFit, Sequence[S
     return fit, found.evidence.signals
 
 
-@dataclass(frozen=True, eq=False)
-class _FixedParameter:
-    """Fit with one parameter to be fixed, by its index among the reported ones and its name."""
+def _hold_reported(
+    fit: LikelihoodFit, signals: Sequence[ShiftSignals], place: int, parameter: str
+) -> HeldParameter:
+    """Hold a reported parameter of a fit, by its place among them and its name."""
+    spread = np.sqrt(np.diag(fit.covariance))
 
-    fit: LikelihoodFit
-    signals: Sequence[ShiftSignals]
-    place: int
-    parameter: str
+    def compute_value(point: ParameterVector) -> float:
+        return list(compute_parameters(fit.problem, point, signals).values())[place]
 
-    @property
-    def problem(self) -> DualClutchProblem:
-        """Objective with the weighting at the minimum."""
-        return self.fit.problem
+    def compute_gradient(point: ParameterVector) -> FloatArray:
+        return np.asarray(compute_jacobian(fit.problem, point, spread, signals)[place])
 
-    @property
-    def point(self) -> ParameterVector:
-        """Minimum."""
-        return self.fit.point
-
-    @property
-    def cost(self) -> float:
-        """Q at the minimum."""
-        return self.fit.normal.cost
-
-    def compute_value(self, point: ParameterVector) -> float:
-        """Compute the parameter at `point`."""
-        return list(compute_parameters(self.fit.problem, point, self.signals).values())[self.place]
-
-    def compute_gradient(self, point: ParameterVector) -> FloatArray:
-        """Compute its derivative (p,) by the unknowns."""
-        std = np.sqrt(np.diag(self.fit.covariance))
-        return np.asarray(compute_jacobian(self.fit.problem, point, std, self.signals)[self.place])
-
-    @property
-    def estimate(self) -> float:
-        """Its value at the minimum."""
-        return self.compute_value(self.fit.point)
-
-    @property
-    def std(self) -> float:
-        """Its standard deviation by the covariance."""
-        row = self.compute_gradient(self.fit.point)
-        return float(np.sqrt(max(float(row @ self.fit.covariance @ row), 0.0)))
-
-    @property
-    def unit(self) -> float:
-        """Rise of Q that counts as one: noise that is louder or slower than the sensors' shows the
-        parameter less."""
-        return compute_variance_inflation(self.fit, self.compute_gradient(self.fit.point)[None, :])
+    row = compute_gradient(fit.point)
+    return HeldParameter(
+        parameter,
+        fit.problem,
+        fit.point,
+        fit.normal.cost,
+        compute_value(fit.point),
+        float(np.sqrt(max(float(row @ fit.covariance @ row), 0.0))),
+        # Noise that is louder or slower than the sensors' shows the parameter less.
+        compute_variance_inflation(fit, row[None, :]),
+        compute_value,
+        compute_gradient,
+    )
 
 
 def _trace_side(held: HeldParameter, sign: float) -> list[tuple[float, float]]:
