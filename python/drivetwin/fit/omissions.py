@@ -3,12 +3,8 @@
 
 An omission is zero in the model as stated: the drag of a shaft, a torque that no input has, the
 delay of a channel, a slope of friction. Its column is the derivative of the recording by it (a
-score test). With A and b its information and pull, the coordinates adjusted, both over the residual
-power, a standard deviation S of its size gives
-
-    ln B(S) = ½·b²/(A + S⁻²) - ½·ln(1 + S²·A)
-
-averaged over S about the usual one. The likeliest omission is put into the model, with its
+score test). Its evidence is that of `column_products`, averaged over standard deviations of its
+size about the usual one. The likeliest omission is put into the model, with its
 likeliest S as prior, while it is likelier than its absence. Each of the others widens the
 covariance by its moves, times its probability.
 """
@@ -24,7 +20,7 @@ from scipy.special import logsumexp
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import Quantity
-from drivetwin.estimation.likelihood.fit import invert_information
+from drivetwin.estimation.likelihood.column_products import adjust_unknowns, weigh_amounts
 from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
 from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import EXPLAINED
@@ -297,16 +293,14 @@ def _weigh_all(found: OptimizeResult[Problem], listed: Sequence[Omission]) -> li
     if normal is None:
         return []
     size = len(found.point.names)
-    information, cross = normal.information[:size, :size], normal.information[:size, size:]
-    moves = -invert_information(information) @ cross
     counted = max(normal.cost / problem.size, 1.0)
-    alone = np.diag(normal.information)[size:] - 1.0
-    own = alone + np.sum(cross * moves, axis=0)
-    pull = -(normal.gradient[size:] + moves.T @ normal.gradient[:size])
+    adjusted = adjust_unknowns(normal.gradient, normal.information, size, counted)
+    alone = (np.diag(normal.information)[size:] - 1.0) / counted
+    rows = zip(listed, np.diag(adjusted.own), adjusted.pull, adjusted.moves.T, alone, strict=True)
     return [
-        _weigh(one, float(a) / counted, float(b) / counted, move)
-        for one, a, b, move, all_of_it in zip(listed, own, pull, moves.T, alone, strict=True)
-        if a > OMISSIONS.least_share * all_of_it
+        _weigh(one, float(own), float(pull), moves)
+        for one, own, pull, moves, whole in rows
+        if own > OMISSIONS.least_share * whole
     ]
 
 
@@ -316,14 +310,13 @@ def _weigh(one: Omission, own: float, pull: float, moves: FloatArray) -> _Weighe
     ends = 2.0 * OMISSIONS.spread
     logs = np.linspace(-ends, ends, OMISSIONS.nodes)
     prior = -0.5 * (logs / OMISSIONS.spread) ** 2
-    variance = np.exp(2.0 * logs)
-    shrunk = variance / (1.0 + variance * own)
-    nats = 0.5 * pull**2 * shrunk - 0.5 * np.log1p(variance * own)
+    sizes = np.exp(logs)
+    of_size = [weigh_amounts(np.array([[s * s * own]]), np.array([s * pull])) for s in sizes]
+    nats = np.array([each.nats for each in of_size])
     best = int(np.argmax(nats + prior))
     evidence = float(logsumexp(nats + prior) - logsumexp(prior))
-    size = float(np.exp(logs[best]))
-    amount = float(pull * shrunk[best]) / size
-    power = float(shrunk[best]) / size**2 + amount**2
+    size, amount = float(sizes[best]), float(of_size[best].amounts[0])
+    power = float(of_size[best].spread[0, 0]) + amount**2
     return _Weighed(one, size, evidence, amount, power, size * moves)
 
 

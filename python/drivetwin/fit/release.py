@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.likelihood.column_products import adjust_unknowns
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.optimize.gauss_newton import (
     OptimizeResult,
@@ -114,8 +115,6 @@ def _find_shown(information: FloatArray, size: int, count: int) -> NDArray[np.bo
     They follow on the `size` coordinates of the search; `information` contains their priors.
     """
     inverse = invert_information(information[:size, :size])
-    cross = information[:size, size:]
-    moves = inverse @ cross
-    shares = np.max(moves[:count] ** 2 / np.diag(inverse)[:count, None], axis=0)
-    own = np.diag(information)[size:] - 1.0 - np.sum(cross * moves, axis=0)
-    return np.asarray((shares > RELEASE.widening) | (own > RELEASE.visible))
+    adjusted = adjust_unknowns(np.zeros(len(information)), information, size)
+    shares = np.max(adjusted.moves[:count] ** 2 / np.diag(inverse)[:count, None], axis=0)
+    return np.asarray((shares > RELEASE.widening) | (np.diag(adjusted.own) > RELEASE.visible))

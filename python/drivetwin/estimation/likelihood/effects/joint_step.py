@@ -7,9 +7,8 @@ about zero with unit variance:
 
     M = [[F, JᵀWZ], [ZᵀWJ, ZᵀWZ + 1]],   (Δθ, a) = M⁻¹·(-g, ZᵀWr)
 
-The covariance of the unknowns is the upper left block of M⁻¹ (Schur complement). For one group of
-columns alone, A = ZᵀWZ - ZᵀWJ·F⁻¹·JᵀWZ and b = ZᵀWr + ZᵀWJ·F⁻¹·g, and the log evidence of the
-effect against its absence is ½·bᵀ(A + 1)⁻¹b - ½·log|A + 1|. The gradient is not left out: what
+The covariance of the unknowns is the upper left block of M⁻¹ (Schur complement). The log evidence
+of one group of columns alone is that of `column_products`. The gradient is not left out: what
 remains of it at the end of a search would look like an effect.
 """
 
@@ -22,7 +21,12 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
-from drivetwin.estimation.likelihood.column_products import compute_column_products
+from drivetwin.estimation.likelihood.column_products import (
+    AdjustedColumns,
+    adjust_unknowns,
+    compute_column_products,
+    weigh_amounts,
+)
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns
 from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
@@ -80,11 +84,16 @@ class WeightedColumns:
             weighted=tuple(scale_columns(one, scale) for one in self.weighted),
         )
 
-    def join(self, normal: NormalEquations) -> tuple[FloatArray, FloatArray]:
-        """Return gradient (p+q,) and information (p+q, p+q) of unknowns and amounts together."""
+    def join(self, information: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return gradient (p+q,) and information (p+q, p+q) of unknowns, of which that is
+        `information` (p, p), and amounts together."""
         own = self.own + np.eye(self.pull.size)
-        information = np.block([[normal.information, self.cross], [self.cross.T, own]])
-        return np.concatenate([self.gradient, -self.pull]), information
+        joint = np.block([[information, self.cross], [self.cross.T, own]])
+        return np.concatenate([self.gradient, -self.pull]), joint
+
+    def adjust(self, information: FloatArray, chi2: float) -> AdjustedColumns:
+        """Adjust the unknowns, for residual power `chi2` per sample and at least that of noise."""
+        return adjust_unknowns(*self.join(information), self.gradient.size, max(chi2, 1.0))
 
     def select(self, picked: list[int]) -> WeightedColumns:
         """Return the sums of some of the columns."""
@@ -179,22 +188,17 @@ def scale_by_evidence(
     effects = [one for one in dict.fromkeys(sums.columns.groups) if one.effect is not None]
     if not effects:
         return sums, {}
-    follows = invert_information(information) @ sums.cross
-    power = max(chi2, 1.0)
-    own = (sums.own - sums.cross.T @ follows) / power
-    pull = (sums.pull + follows.T @ sums.gradient) / power
+    adjusted = sums.adjust(information, chi2)
+    own, pull = adjusted.own, adjusted.pull
     members = np.array([[one == group for one in sums.columns.groups] for group in effects], float)
 
     def evaluate(logs: FloatArray) -> tuple[float, FloatArray]:
         """Return minus the log posterior of the sizes, and its gradient."""
         scale = np.exp(logs @ members)
-        matrix = np.eye(scale.size) + np.outer(scale, scale) * own
-        spread = np.linalg.inv(matrix)
-        amounts = spread @ (scale * pull)
-        nats = 0.5 * float((scale * pull) @ amounts) - 0.5 * float(np.linalg.slogdet(matrix)[1])
-        slope = members @ (amounts**2 + np.diag(spread) - 1.0)
+        one = weigh_amounts(np.outer(scale, scale) * own, scale * pull)
+        slope = members @ (one.amounts**2 + np.diag(one.spread) - 1.0)
         prior = logs / SIZES.spread**2
-        return 0.5 * float(logs @ prior) - nats, prior - slope
+        return 0.5 * float(logs @ prior) - one.nats, prior - slope
 
     found = minimize(
         evaluate,
@@ -258,24 +262,18 @@ def _evaluate_groups(
     sums: WeightedColumns, information: FloatArray, chi2: float, groups: Sequence[Group]
 ) -> dict[Group, GroupEvidence]:
     """Compute the evidence of some groups beside unknowns of this `information`."""
-    follows = invert_information(information) @ sums.cross
-    power = max(chi2, 1.0)
-    own = (sums.own - sums.cross.T @ follows) / power
-    pull = (sums.pull + follows.T @ sums.gradient) / power
+    adjusted = sums.adjust(information, chi2)
     found = {}
     for group in groups:
         k = sums.columns.find_columns(group)
-        matrix = own[np.ix_(k, k)] + np.eye(len(k))
-        spread = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
-        amounts = spread @ pull[k]
-        nats = 0.5 * float(pull[k] @ amounts) - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        one = weigh_amounts(adjusted.own[np.ix_(k, k)], adjusted.pull[k])
         found[group] = GroupEvidence(
-            nats,
-            amounts,
-            np.sqrt(np.diag(spread)),
+            one.nats,
+            one.amounts,
+            np.sqrt(np.diag(one.spread)),
             tuple(k),
-            own[:, k] @ amounts,
-            -follows[:, k] @ amounts,
+            adjusted.own[:, k] @ one.amounts,
+            adjusted.moves[:, k] @ one.amounts,
         )
     return found
 
@@ -303,7 +301,7 @@ def take_joint_step(
 ) -> JointStep:
     """Step from the expansion `normal` in the unknowns and the amounts of the effects."""
     size = normal.gradient.size
-    gradient, matrix = sums.join(normal)
+    gradient, matrix = sums.join(normal.information)
     inverse = invert_information(matrix)
     step = -inverse @ gradient
     moves, amounts = step[:size], step[size:]
@@ -326,9 +324,9 @@ def take_joint_step(
             join_columns(*both) for both in zip(normal.regressors, sums.weighted, strict=True)
         ),
     )
-    follows = invert_information(normal.information) @ sums.cross
+    follows = sums.adjust(normal.information, chi2).moves
     contributions = {
-        group: -follows[:, k] @ amounts[k]
+        group: follows[:, k] @ amounts[k]
         for group in dict.fromkeys(sums.columns.groups)
         for k in [sums.columns.find_columns(group)]
     }

@@ -409,7 +409,7 @@ def _choices(
     score = compute_column_products(problem, normal, changes)
     gradient, information, cross = normal.gradient, normal.information, score.cross
     if effects is not None:
-        gradient, information = effects.join(normal)
+        gradient, information = effects.join(normal.information)
         answers = sum(w.T @ one for w, one in zip(effects.weighted, changes, strict=True))
         cross = np.vstack([cross, np.asarray(answers)])
     shown = {*_shown(problem), TORQUE} if is_enabled(Mechanism.SAMPLING_MODES) else set()
