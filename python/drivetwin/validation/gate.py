@@ -114,7 +114,10 @@ def _has_limits(found: Identification) -> bool:
     cause = found.evidence.cause
     if cause is not None and not cause.in_plant:
         return True
-    return any(one.severity is Severity.ERROR for one in found.findings) or any(
+    findings = found.findings
+    if any(one.code is Code.RESIDUAL_ABOVE_NOISE for one in findings):
+        return True
+    return any(one.severity is Severity.ERROR for one in findings) or any(
         one.verdict in (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE) for one in found.estimates.values()
     )
 

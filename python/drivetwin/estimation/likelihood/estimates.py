@@ -181,7 +181,10 @@ def build_estimates(
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     curves = build_friction_curves(fit, corrected)
     ids = fitted.ids
-    withdrawn = find_unreliable(corrected, ids, matrix, std)
+    labels = collect_shift_labels(signals)
+    likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
+    departures = check_residuals(fit, labels, corrected.residuals, *likeliest)
+    withdrawn = find_unreliable(corrected, ids, matrix, std, is_noise=not departures)
     subjects = {one.subject for one in withdrawn}
     accuses = "" not in subjects and not is_at_bound(fit, corrected.mean.values)
     conflicts = fitted.list_conflicts(subjects) if accuses else ()
@@ -191,10 +194,11 @@ def build_estimates(
         for one in find_at_bounds(fit, ids, matrix)
         if estimates[one.subject].verdict is not Verdict.DESIGN
     ]
-    labels = collect_shift_labels(signals)
-    likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
+    chi2 = corrected.step.chi2
+    above = chi2 > EXPLAINED and not withdrawn
     disagreements = (
-        *check_residuals(fit, labels, corrected.residuals, *likeliest),
+        *departures,
+        *((report(Code.RESIDUAL_ABOVE_NOISE, chi2=chi2),) if above else ()),
         *find_order(fit.problem, corrected.residuals),
         *check_weighting(fit, labels),
         *(() if correction is not None else (report(Code.EFFECTS_OMITTED),)),

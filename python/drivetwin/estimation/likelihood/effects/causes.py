@@ -51,7 +51,12 @@ EXEMPT = (EffectId.FRICTION_SHAPE, None)
 
 
 def find_unreliable(
-    correction: Correction, ids: Sequence[str], jacobian: FloatArray, std: FloatArray
+    correction: Correction,
+    ids: Sequence[str],
+    jacobian: FloatArray,
+    std: FloatArray,
+    *,
+    is_noise: bool,
 ) -> list[Finding]:
     """Find the values that the correction does not make reliable, each with the reason as an error.
 
@@ -60,9 +65,10 @@ def find_unreliable(
     ids : parameter ids (k,) of the values
     jacobian : derivatives (k, p) of the values by the unknowns of the fit
     std : total standard deviations (k,) of the values
+    is_noise : whether the residual is as white as noise; more power of it is in the intervals
     """
     chi2 = correction.step.chi2
-    if chi2 > WITHDRAWAL.chi2:
+    if chi2 > WITHDRAWAL.chi2 and not is_noise:
         return [report(Code.RESIDUAL_UNEXPLAINED, chi2=chi2)]
     if not np.all(np.isfinite(correction.last)):
         return [report(Code.EFFECT_NOT_LINEAR, name) for name in ids]
