@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import get_pressure_element
@@ -31,9 +30,7 @@ class UnlistedId(StrEnum):
     FIRING_ORDER = "firing_order"
     """Amplitude of the ripple of the input speed three times per turn, over the speed."""
     CLOCK_DRIFT = "clock_drift"
-    """Error of the rate of the clock of the output torque."""
-    TORQUE_FILTER = "torque_filter"
-    """Delay of a Butterworth filter of order two in the output torque [s]."""
+    """Error of the rate of the clock of the output torque: quartz clocks have 20 to 100 ppm."""
 
 
 @dataclass(frozen=True)
@@ -95,23 +92,12 @@ def _stretch_time(_: DynoRun, channel: Channel, size: float) -> FloatArray:
     return np.asarray(np.interp(acting, channel.time, channel.values), dtype=np.float64)
 
 
-def _filter_torque(_: DynoRun, channel: Channel, size: float) -> FloatArray:
-    if channel.role != "output_torque" or size == 0.0:
-        return channel.values
-    rate = (channel.time.size - 1) / float(np.ptp(channel.time))
-    corner = min(np.sqrt(2.0) / (2.0 * np.pi * size), 0.45 * rate)
-    sections = butter(2, corner, fs=rate, output="sos")
-    state = sosfilt_zi(sections) * channel.values[0]
-    return np.asarray(sosfilt(sections, channel.values, zi=state)[0])
-
-
 UNLISTED: dict[UnlistedId, Unlisted] = {
     UnlistedId.PRESSURE_HYSTERESIS: Unlisted(5e3, _add_play),
     UnlistedId.PRESSURE_CURVATURE: Unlisted(0.005, _bend_pressure),
     UnlistedId.PRESSURE_STEP: Unlisted(5e3, _round_pressure),
     UnlistedId.FIRING_ORDER: Unlisted(1e-3, _add_firing),
-    UnlistedId.CLOCK_DRIFT: Unlisted(5e-4, _stretch_time),
-    UnlistedId.TORQUE_FILTER: Unlisted(3e-3, _filter_torque),
+    UnlistedId.CLOCK_DRIFT: Unlisted(1e-4, _stretch_time),
 }
 """Sizes of good workshop equipment; engineering estimates."""
 

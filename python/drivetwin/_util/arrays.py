@@ -232,13 +232,19 @@ def filter_zero_phase(values: FloatArray, step: float, cutoff: float) -> FloatAr
     """
     head = 2.0 * values[0] - values[_PADDING:0:-1]
     tail = 2.0 * values[-1] - values[-2 : -_PADDING - 2 : -1]
+    forward = apply_low_pass(np.concatenate([head, values, tail]), step, cutoff)
+    both = apply_low_pass(forward[::-1], step, cutoff)[::-1]
+    return np.asarray(both[_PADDING:-_PADDING])
+
+
+def apply_low_pass(values: FloatArray, step: float, cutoff: float) -> FloatArray:
+    """Low-pass `values` (n,), sampled every `step` [s] and at rest before them, by a Butterworth of
+    order 2 with a `cutoff` [Hz] below half the sampling rate."""
     k = float(np.tan(np.pi * cutoff * step))
     scale = 1.0 / (1.0 + np.sqrt(2.0) * k + k**2)
     moving = scale * k**2 * np.array([1.0, 2.0, 1.0])
     recursive = np.array([1.0, 2.0 * scale * (k**2 - 1.0), scale * (1.0 - np.sqrt(2.0) * k + k**2)])
-    forward = _filter(np.concatenate([head, values, tail]), moving, recursive)
-    both = _filter(forward[::-1], moving, recursive)[::-1]
-    return np.asarray(both[_PADDING:-_PADDING])
+    return _filter(values, moving, recursive)
 
 
 def _filter(values: FloatArray, moving: FloatArray, recursive: FloatArray) -> FloatArray:

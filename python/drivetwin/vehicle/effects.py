@@ -38,6 +38,7 @@ class EffectId(StrEnum):
     TORQUE_MAP = "torque_map"
     OUTPUT_TORQUE_CURVE = "output_torque_curve"
     SPEED_RUN_OUT = "speed_run_out"
+    OUTPUT_TORQUE_FILTER = "output_torque_filter"
 
 
 @dataclass(frozen=True)

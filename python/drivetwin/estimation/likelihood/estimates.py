@@ -66,7 +66,7 @@ from drivetwin.estimation.likelihood.uncertainty.torque_scale import (
     scale_covariance,
 )
 from drivetwin.estimation.optimize.objective import ParameterVector, find_acting, join_columns
-from drivetwin.estimation.result.cause import EXPLAINED, WRONG_ENTRY, PredictedSpread
+from drivetwin.estimation.result.cause import EXPLAINED, WRONG_ENTRY, Cause, PredictedSpread
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
     EstimateSet,
@@ -181,10 +181,7 @@ def build_estimates(
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     curves = build_friction_curves(fit, corrected)
     ids = fitted.ids
-    labels = collect_shift_labels(signals)
-    likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
-    departures = check_residuals(fit, labels, corrected.residuals, *likeliest)
-    withdrawn = find_unreliable(corrected, ids, matrix, std, is_noise=not departures)
+    departures, withdrawn = _find_departures(fit, signals, corrected, cause, own)
     subjects = {one.subject for one in withdrawn}
     accuses = "" not in subjects and not is_at_bound(fit, corrected.mean.values)
     conflicts = fitted.list_conflicts(subjects) if accuses else ()
@@ -194,16 +191,8 @@ def build_estimates(
         for one in find_at_bounds(fit, ids, matrix)
         if estimates[one.subject].verdict is not Verdict.DESIGN
     ]
-    chi2 = corrected.step.chi2
-    above = chi2 > EXPLAINED and not withdrawn
-    disagreements = (
-        *departures,
-        *((report(Code.RESIDUAL_ABOVE_NOISE, chi2=chi2),) if above else ()),
-        *find_order(fit.problem, corrected.residuals),
-        *check_weighting(fit, labels),
-        *(() if correction is not None else (report(Code.EFFECTS_OMITTED),)),
-        *withdrawn,
-    )
+    omitted = () if correction is not None else (report(Code.EFFECTS_OMITTED),)
+    disagreements = (*departures, *omitted, *withdrawn)
     doubt = dict(zip(ids, compute_doubt(corrected, matrix).tolist(), strict=True))
     for name in ids if "" in subjects else subjects:
         estimates[name] = add_systematic(estimates[name], doubt[name])
@@ -245,6 +234,27 @@ def build_estimates(
         rank_card_numbers(corrected, ids, matrix),
         read_map_changes(corrected.mean),
     )
+
+
+def _find_departures(
+    fit: LikelihoodFit,
+    signals: Sequence[ShiftSignals],
+    corrected: Correction,
+    cause: Cause | None,
+    own: _ReportedParameters,
+) -> tuple[list[Finding], list[Finding]]:
+    """Find departures of the residual from noise, and the values that are not reliable."""
+    labels = collect_shift_labels(signals)
+    likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
+    found = check_residuals(fit, labels, corrected.residuals, *likeliest)
+    withdrawn = find_unreliable(
+        corrected, own.fitted.ids, own.jacobian, own.std, is_noise=not found
+    )
+    chi2 = corrected.step.chi2
+    if chi2 > EXPLAINED and not withdrawn:
+        found.append(report(Code.RESIDUAL_ABOVE_NOISE, chi2=chi2))
+    found += [*find_order(fit.problem, corrected.residuals), *check_weighting(fit, labels)]
+    return found, withdrawn
 
 
 def _check_other_law(

@@ -17,7 +17,10 @@ from drivetwin.estimation.likelihood.effects.effect import (
     build_random_walk,
     draw_walk,
 )
-from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
+    SyntheticVehicle,
+    filter_torque,
+)
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId
 
@@ -113,6 +116,33 @@ OUTPUT_TORQUE_DELAY = Effect(
 )
 
 
+def build_output_torque_filter(at: OperatingPoint, std: float) -> list[Disturbance]:
+    """Filter the simulated output torque; the speeds are the reference clock."""
+    time, torque = at.run.time, at.run.shaft_torque
+    change = np.sign(std) * (filter_torque(time, torque, abs(std)) - torque)
+    return [Disturbance(outputs={OUTPUT_TORQUE: change})]
+
+
+def apply_output_torque_filter(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
+    """Put a filter behind the sensor."""
+    return replace(vehicle, errors=replace(vehicle.errors, filter_delay=size))
+
+
+OUTPUT_TORQUE_FILTER = Effect(
+    EffectId.OUTPUT_TORQUE_FILTER,
+    "a low-pass filter of the output torque",
+    "s",
+    0.003,
+    "typical range of anti-aliasing filters and telemetry of torque sensors, 1 to 5 ms of delay: a "
+    "Butterworth of order 2 at 45 to 225 Hz",
+    "record the output torque with a faster filter, or all channels with the same one",
+    build_output_torque_filter,
+    apply_output_torque_filter,
+    curved=True,
+    on_sensor=True,
+)
+
+
 def build_output_torque_curve(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Add an error that grows with the square of the output torque."""
     torque = at.run.shaft_torque
@@ -177,4 +207,5 @@ EFFECTS = (
     OUTPUT_TORQUE_DELAY,
     OUTPUT_TORQUE_CURVE,
     SPEED_RUN_OUT,
+    OUTPUT_TORQUE_FILTER,
 )

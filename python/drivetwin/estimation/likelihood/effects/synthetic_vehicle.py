@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from drivetwin._util.arrays import FloatArray, integrate_trapezoids
+from drivetwin._util.arrays import FloatArray, apply_low_pass, integrate_trapezoids
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS, AddedElements
 from drivetwin.simulation.driveline import settle
 from drivetwin.simulation.driveline_run import DrivelineTask
@@ -83,12 +83,29 @@ def compute_friction_work(run: Trajectory, element: str) -> FloatArray:
     return integrate_trapezoids(power, run.time)
 
 
+FILTER_STEP = 2.5e-4
+"""Raster [s] of a filtered torque: a twelfth of the usual delay of a filter."""
+
+
+def filter_torque(time: FloatArray, torque: FloatArray, delay: float) -> FloatArray:
+    """Filter a torque (n,) at the instants `time` (n,) [s] by a Butterworth of order 2 that delays
+    slow changes by `delay` [s]; one below the raster filters nothing."""
+    if delay < FILTER_STEP:
+        return torque
+    raster = np.arange(time[0], time[-1] + FILTER_STEP, FILTER_STEP)
+    cutoff = np.sqrt(2.0) / (2.0 * np.pi * delay)
+    return np.interp(
+        time, raster, apply_low_pass(np.interp(raster, time, torque), FILTER_STEP, cutoff)
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class SensorErrors:
     """Errors of recorded outputs.
 
     Those of the output torque are `offset` and `drift` [N m], `delay` [s] and `curve` [1/(N m)],
-    an error in proportion to the square of the torque. `run_out` is the amplitude of the error of
+    an error in proportion to the square of the torque, and `filter_delay` [s], that of a low-pass
+    filter. `run_out` is the amplitude of the error of
     the speed at the engine once per turn, over the speed.
     """
 
@@ -97,6 +114,7 @@ class SensorErrors:
     delay: float = 0.0
     curve: float = 0.0
     run_out: float = 0.0
+    filter_delay: float = 0.0
 
     def compute(
         self, role: str, stamps: FloatArray, exact: FloatArray, run: Trajectory
@@ -113,7 +131,10 @@ class SensorErrors:
             return np.zeros_like(stamps)
         drift = self.drift
         walk = 0.0 if drift is None else np.interp(stamps, drift.time, drift.values)
-        return np.asarray(self.offset + walk + self.curve * exact * np.abs(exact))
+        torque = run.shaft_torque
+        filtered = filter_torque(run.time, torque, self.filter_delay) - torque
+        lost = np.interp(stamps, run.time, filtered)
+        return np.asarray(self.offset + walk + self.curve * exact * np.abs(exact) + lost)
 
 
 @dataclass(frozen=True, eq=False)
