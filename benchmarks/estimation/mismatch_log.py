@@ -58,7 +58,7 @@ def make_mismatch_log(
     """Make the log of the vehicle of `seed` with one effect of a size, or without effect.
 
     Effects `beside` it act as well, by their sizes. With `tolerances` the card states those of the
-    sensors, which read wrongly within them. A log with backlash has tips into overrun before the shift.
+    sensors, which read wrongly within them. A log with backlash has tips into overrun before it.
     Raises InputError for an impossible size, SimulationError where the run does not complete.
     """
     recorded = record_vehicle(seed, effect, size, rates, tolerances=tolerances, beside=beside)

@@ -126,7 +126,6 @@ def test_unlisted_mismatch_changes_its_own_channels_alone(which: UnlistedId) -> 
         UnlistedId.PRESSURE_STEP: pressures,
         UnlistedId.FIRING_ORDER: {"input_speed"},
         UnlistedId.CLOCK_DRIFT: {"output_torque"},
-        UnlistedId.TORQUE_FILTER: {"output_torque"},
     }
     assert changed == expected[which]
     assert wrong.truth is recorded.truth
