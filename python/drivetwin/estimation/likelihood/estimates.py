@@ -181,7 +181,7 @@ def build_estimates(
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     curves = build_friction_curves(fit, corrected)
     ids = fitted.ids
-    departures, withdrawn = _find_departures(fit, signals, corrected, cause, own)
+    doubts, withdrawn = _judge_residuals(fit, signals, corrected, cause, own)
     subjects = {one.subject for one in withdrawn}
     accuses = "" not in subjects and not is_at_bound(fit, corrected.mean.values)
     conflicts = fitted.list_conflicts(subjects) if accuses else ()
@@ -192,7 +192,7 @@ def build_estimates(
         if estimates[one.subject].verdict is not Verdict.DESIGN
     ]
     omitted = () if correction is not None else (report(Code.EFFECTS_OMITTED),)
-    disagreements = (*departures, *omitted, *withdrawn)
+    disagreements = (*doubts, *omitted, *withdrawn)
     doubt = dict(zip(ids, compute_doubt(corrected, matrix).tolist(), strict=True))
     for name in ids if "" in subjects else subjects:
         estimates[name] = add_systematic(estimates[name], doubt[name])
@@ -236,14 +236,14 @@ def build_estimates(
     )
 
 
-def _find_departures(
+def _judge_residuals(
     fit: LikelihoodFit,
     signals: Sequence[ShiftSignals],
     corrected: Correction,
     cause: Cause | None,
     own: _ReportedParameters,
 ) -> tuple[list[Finding], list[Finding]]:
-    """Find departures of the residual from noise, and the values that are not reliable."""
+    """Find what distinguishes the residual from noise, and the values that are not reliable."""
     labels = collect_shift_labels(signals)
     likeliest = () if cause is None else (describe_cause(cause), get_advice(cause))
     found = check_residuals(fit, labels, corrected.residuals, *likeliest)
