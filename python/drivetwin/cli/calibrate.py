@@ -82,8 +82,11 @@ from drivetwin.files.result_file import load_result
 from drivetwin.files.twin_file import load_twin, save_twin
 from drivetwin.findings import Finding
 from drivetwin.report.blocks import Block, Outcome
-from drivetwin.report.calibration import build_calibration_blocks, build_calibration_page
-from drivetwin.report.correction import build_correction_blocks
+from drivetwin.report.calibration import (
+    build_calibration_blocks,
+    build_calibration_page,
+    build_correction_blocks,
+)
 from drivetwin.report.html import save_page
 from drivetwin.report.model_verdict import explain_result
 from drivetwin.shifts.detect import require_shifts
