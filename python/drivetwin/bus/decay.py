@@ -23,6 +23,7 @@ from scipy.special import chdtrc
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.bus.drift import (
     NoiseSize,
+    Regression,
     Swing,
     build_covariance,
     build_drift_kernel,
@@ -206,16 +207,25 @@ def fit_decays(records: Sequence[DecayRecord], start: Swing | None = None) -> Jo
     for turn in range(DECAY.rounds):
         if turn:
             sizes = [_fit_size(one, swing, size) for one, size in zip(thinned, sizes, strict=True)]
-        made = [_expand(one, swing, size) for one, size in zip(thinned, sizes, strict=True)]
-        slope = np.sum([one[0] for one in made], axis=0)
-        information = np.sum([one[1] for one in made], axis=0)
-        move = _limit_step(swing, slope, information)
-        if move is None:
+        swing, left, _ = _climb(thinned, swing, sizes)
+        if left is None:
             return None
-        swing = _move(swing, move)
-        if float(move @ information @ move) < DECAY.converged**2:
+        if left < DECAY.converged:
             break
     return _finish(thinned, swing, sizes, step)
+
+
+def _climb(
+    records: Sequence[DecayRecord], swing: Swing, sizes: Sequence[NoiseSize]
+) -> tuple[Swing, float | None, FloatArray]:
+    """Take a Newton step; return the oscillator after it, its size in standard deviations, None
+    where the decays determine no step, and the information (2, 2) before it."""
+    made = [_expand(one, swing, size) for one, size in zip(records, sizes, strict=True)]
+    information = np.sum([one[1] for one in made], axis=0)
+    move = _limit_step(swing, np.sum([one[0] for one in made], axis=0), information)
+    if move is None:
+        return swing, None, information
+    return _move(swing, move), float(np.sqrt(move @ information @ move)), information
 
 
 def _finish(
@@ -227,8 +237,9 @@ def _finish(
         return None
     found = Swing(max(float(combined.value[0]), 1e-9), float(combined.value[1]))
     fits = tuple(
-        DecayFit(one, size, _compute_mean(one, found, size))
+        DecayFit(one, size, np.zeros(one.time.size) if made is None else made.mean)
         for one, size in zip(records, sizes, strict=True)
+        for made in [_regress(one, found, size, one.build_columns(found))]
     )
     return JointDecay(combined, fits, _compute_chance(records, swing, sizes), step)
 
@@ -239,12 +250,8 @@ def _find_own(one: DecayRecord, swing: Swing, size: NoiseSize) -> ShiftValue:
     One Newton step would leave the range of its expansion where a decay contradicts the others.
     """
     for _ in range(DECAY.rounds):
-        slope, information = _expand(one, swing, size)
-        step = _limit_step(swing, slope, information)
-        if step is None:
-            break
-        swing = _move(swing, step)
-        if float(step @ information @ step) < DECAY.converged**2:
+        swing, left, information = _climb([one], swing, [size])
+        if left is None or left < DECAY.converged:
             break
     return ShiftValue(one.label, np.array([swing.rate, swing.omega]), information, one.kind)
 
@@ -253,9 +260,15 @@ def _fit_size(one: DecayRecord, swing: Swing, start: NoiseSize | None) -> NoiseS
     return fit_noise(one.time, one.build_columns(swing), one.values, one.floor, swing, start)
 
 
-def _score(one: DecayRecord, swing: Swing, size: NoiseSize) -> float:
+def _regress(
+    one: DecayRecord, swing: Swing | None, size: NoiseSize, columns: FloatArray
+) -> Regression | None:
     covariance = build_covariance(one.time, size, one.floor, swing)
-    made = regress(one.build_columns(swing), one.values, covariance)
+    return regress(columns, one.values, covariance)
+
+
+def _score(one: DecayRecord, swing: Swing, size: NoiseSize) -> float:
+    made = _regress(one, swing, size, one.build_columns(swing))
     return -np.inf if made is None else made.log_likelihood
 
 
@@ -323,13 +336,6 @@ def _compute_log_rms(one: DecayRecord, swing: Swing) -> float:
     return 0.5 * one.time.size * float(np.log(left @ left + one.time.size * one.floor**2))
 
 
-def _compute_mean(one: DecayRecord, swing: Swing, size: NoiseSize) -> FloatArray:
-    columns = one.build_columns(swing)
-    made = regress(columns, one.values, build_covariance(one.time, size, one.floor, swing))
-    beta = np.zeros(columns.shape[1]) if made is None else made.beta
-    return np.asarray(columns @ beta)
-
-
 def _compute_chance(
     records: Sequence[DecayRecord], swing: Swing, sizes: Sequence[NoiseSize]
 ) -> float:
@@ -341,21 +347,12 @@ def _compute_chance(
     for one, size in zip(records, sizes, strict=True):
         still = np.delete(one.build_columns(swing), (2, 3), axis=1)
         without = fit_noise(one.time, still, one.values, one.floor, None)
-        plain = _profile(one, still, without, None)
-        gain += _profile(one, one.build_columns(swing), size, swing) - plain
+        both = _regress(one, swing, size, one.build_columns(swing))
+        plain = _regress(one, None, without, still)
+        gain += -np.inf if both is None else both.best
+        gain -= -np.inf if plain is None else plain.best
     tested = 3 * len(records)
     return float(min(1.0, DECAY.frequencies * chdtrc(tested, max(2.0 * gain, 0.0))))
-
-
-def _profile(one: DecayRecord, columns: FloatArray, size: NoiseSize, swing: Swing | None) -> float:
-    """Log likelihood at the best coefficients, comparable between sets of columns."""
-    covariance = build_covariance(one.time, size, one.floor, swing)
-    made = regress(columns, one.values, covariance)
-    if made is None:
-        return -np.inf
-    left = one.values - columns @ made.beta
-    square = left @ np.linalg.solve(covariance, left)
-    return -0.5 * float(np.linalg.slogdet(covariance)[1] + square)
 
 
 @dataclass(frozen=True, eq=False)

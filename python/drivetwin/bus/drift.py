@@ -47,11 +47,16 @@ class NoiseSize:
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Coefficients (p,) with covariance (p, p), and the log likelihood."""
+    """Coefficients (p,) with covariance (p, p), the mean (n,) and the log likelihood.
+
+    `best` is the log likelihood at the coefficients, comparable between sets of columns.
+    """
 
     beta: FloatArray
     covariance: FloatArray
+    mean: FloatArray
     log_likelihood: float
+    best: float
 
 
 def build_drift_kernel(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -90,12 +95,14 @@ def regress(columns: FloatArray, values: FloatArray, covariance: FloatArray) -> 
         spread = cho_solve(inner, np.eye(beta.size))
     except (LinAlgError, ValueError):
         return None
-    residual = values - columns @ beta
+    mean = columns @ beta
+    residual = values - mean
     square = residual @ cho_solve(factor, residual)
     log_k = 2.0 * np.sum(np.log(np.diag(factor[0])))
     log_x = np.linalg.slogdet(columns.T @ columns)[1]
     log_i = 2.0 * np.sum(np.log(np.diag(inner[0])))
-    return Regression(beta, spread, -0.5 * float(log_k + log_i - log_x + square))
+    best = -0.5 * float(log_k + square)
+    return Regression(beta, spread, mean, best - 0.5 * float(log_i - log_x), best)
 
 
 def fit_noise(

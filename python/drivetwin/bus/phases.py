@@ -9,6 +9,7 @@ end inside a shift.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -20,7 +21,12 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import FloatArray, Span, find_true_runs
 from drivetwin.bus.recording import BusLog
 from drivetwin.shifts.candidate import Run, detect_gear_runs
-from drivetwin.shifts.shift import GearboxSpeeds, ShiftSettings
+from drivetwin.shifts.shift import (
+    GearboxSpeeds,
+    ShiftSettings,
+    find_held_ratios,
+    merge_equal_ratios,
+)
 
 SETTINGS = ShiftSettings(ratio_tolerance=0.02)
 """Settings of the gears held. The tolerance is that of a ratio while the driveline swings."""
@@ -34,8 +40,6 @@ _FLAG_REACH = 1.0
 """Longest time [s] between engaged gear and end of the shift flag that belong to one shift."""
 _CLUSTER = 0.04
 """Relative distance of two gears that differ without a card; real steps are above 0.1."""
-_STEADY = 0.3
-"""Time [s] over which the ratio of a gear held is constant."""
 
 
 class PhaseName(StrEnum):
@@ -287,47 +291,29 @@ class _Part:
 
 
 def estimate_ratios(logs: Sequence[BusLog]) -> dict[str, float]:
-    """Ratios of the gears that the logs hold, by the name on the bus, else by the ratio itself."""
-    ratios, names, weights = [], [], []
-    for log in logs:
-        for stretch in log.stretches:
-            speeds = sample_speeds(log, stretch, 0.0)
-            if speeds.time.size < _MIN_SAMPLES:
-                continue
-            steady, ratio = _find_steady(speeds)
-            ratios += list(ratio[steady])
-            names += [log.get_gear_value(float(one)) for one in speeds.time[steady]]
-            weights += [speeds.step] * int(np.count_nonzero(steady))
-    if not ratios:
-        return {}
-    order = np.argsort(ratios)
-    values, held = np.array(ratios)[order], np.array(weights)[order]
-    named = np.array(names)[order]
+    """Ratios of the gears that the logs hold, by the name on the bus, else by the ratio itself.
+
+    Of ratios nearer than two gears can be, the one that is held longest counts.
+    """
+    parts = [(log, sample_speeds(log, one, 0.0)) for log in logs for one in log.stretches]
+    parts = [(log, speeds) for log, speeds in parts if speeds.time.size >= _MIN_SAMPLES]
+    held = merge_equal_ratios(one for _, speeds in parts for one in find_held_ratios(speeds))
+    ratios: list[float] = []
+    for one in sorted(held, key=lambda each: -each.time):
+        if all(abs(np.log(one.ratio / other)) > _CLUSTER for other in ratios):
+            ratios.append(one.ratio)
     found: dict[str, float] = {}
-    for group in np.split(
-        np.arange(values.size), np.flatnonzero(np.diff(np.log(values)) > _CLUSTER) + 1
-    ):
-        if held[group].sum() < _STEADY:
-            continue
-        middle = float(np.median(values[group]))
-        kinds, counts = np.unique(named[group], return_counts=True)
-        name = str(kinds[np.argmax(counts)])
-        found[name if name and name not in found else f"i={middle:.3f}"] = middle
-    return dict(sorted(found.items(), key=lambda one: -one[1]))
+    for ratio in sorted(ratios, reverse=True):
+        name = _find_name(parts, ratio)
+        found[name if name and name not in found else f"i={ratio:.3f}"] = ratio
+    return found
 
 
-def _find_steady(speeds: GearboxSpeeds) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Samples at which the ratio is constant over `_STEADY`, and the ratio (n,)."""
-    moving = speeds.output > SETTINGS.min_output_speed
-    ratio = np.divide(speeds.input, speeds.output, out=np.zeros_like(speeds.input), where=moving)
-    half = 0.5 * _STEADY
-    first = np.searchsorted(speeds.time, speeds.time - half)
-    stop = np.searchsorted(speeds.time, speeds.time + half, side="right")
-    steady = np.zeros(ratio.size, np.bool_)
-    for k in np.flatnonzero(moving):
-        part = ratio[first[k] : stop[k]]
-        inside = (
-            speeds.time[k] - half >= speeds.time[0] and speeds.time[k] + half <= speeds.time[-1]
-        )
-        steady[k] = inside and np.ptp(part) < SETTINGS.ratio_tolerance * ratio[k]
-    return steady, ratio
+def _find_name(parts: Sequence[tuple[BusLog, GearboxSpeeds]], ratio: float) -> str:
+    """Find the gear that the bus names most often while a ratio is held; empty without any."""
+    names: Counter[str] = Counter()
+    for log, speeds in parts:
+        near = np.abs(speeds.compute_sync_error(ratio)) < SETTINGS.ratio_tolerance * speeds.input
+        moving = speeds.output > SETTINGS.min_output_speed
+        names.update(log.get_gear_value(float(one)) for one in speeds.time[near & moving])
+    return max(names, key=lambda one: names[one], default="")
