@@ -299,8 +299,11 @@ def _conclude(
     extra = _compute_model_spread(fit)
     spread = compute_size_spread(step, sizes)
     values = fit.mean.values + base.point.values - fit.point.values + chosen.moves
+    mean = fit.mean.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper))
+    if any(term.evaluate(mean) is None for term in fit.problem.terms):
+        mean, last = fit.mean, np.full_like(last, np.inf)  # no vehicle has such values
     return Correction(
-        fit.mean.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper)),
+        mean,
         (step.covariance + spread)[:size, :size] + np.outer(rest, rest) + extra,
         _compute_noise(base.normal, step) + extra,
         chosen.inverse[:size, :size],
