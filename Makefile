@@ -120,7 +120,8 @@ wheel_build = --quiet --profile $(wheel_profile) $(flags_$(wheel_profile)) --loc
 wheel test-reproducible: export SOURCE_DATE_EPOCH = $(shell git log -1 --format=%ct)
 
 .PHONY: wheel
-wheel: $(venv)/.base ## the abi3 wheel, into dist/
+wheel: $(venv)/.base ## the abi3 wheel, into dist/; no release with old figures
+	$(if $(filter release,$(wheel_profile)),$(bin)/python -m tools.results_page --fresh)
 	rm -f dist/drivetwin-*.whl
 	$(rust_$(wheel_profile)) $(bin)/maturin build $(wheel_build) --out dist
 	ls dist/drivetwin-*.whl
@@ -158,8 +159,23 @@ bench: $(venv)/.dev ## measure what has a stated limit
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.progress # with --write: shares of the progress shown
 	OMP_NUM_THREADS=1 $(bin)/python -m benchmarks.calibration_points
 	$(bin)/python -m benchmarks.export_step # writes docs/export-cost.md
-	$(bin)/python -m benchmarks.speed # writes docs/benchmarks.md
-	$(bin)/python -m benchmarks.stiff # writes docs/stiffness.md
+	$(MAKE) figures
+
+.PHONY: figures
+figures: $(venv)/.dev ## build what is timed, measure speed anew and build its pages
+	$(pip) install --quiet --requirement benchmarks/precision/peers/requirements.txt # not in constraints.txt
+	$(MAKE) native profile=release
+	cargo build --quiet --locked --release --package drivetwin-core --example one_shift
+	$(MAKE) measure
+
+# Of the build at hand; four minutes on a quiet machine.
+.PHONY: measure
+measure: export OPENBLAS_NUM_THREADS = 1
+measure: ## measure speed into benchmarks/results and build the pages from it
+	$(bin)/python -m benchmarks.speed --no-build
+	$(bin)/python -m benchmarks.precision
+	-$(bin)/python -m benchmarks.pipeline --large # fails where a limit is missed
+	$(bin)/python -m tools.results_page
 
 .PHONY: fuzz
 fuzz: $(venv)/.dev native ## 20,000 damaged files through each reader, for an hour or two

@@ -7,11 +7,12 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+_CODE = ("python", "crates", "benchmarks", ":!benchmarks/results")
 
 
 def read_commit() -> str:
     """Return the running commit, and whether its code was changed."""
-    changed = _run_git("status", "--porcelain", "--", "python", "crates", "benchmarks")
+    changed = _run_git("status", "--porcelain", "--", *_CODE)
     return _run_git("rev-parse", "--short=10", "HEAD") + (", changed" if changed else "")
 
 

@@ -58,8 +58,8 @@ def run_clutches(count: int) -> NetworkRun:
     return simulate(elements, inputs, Start({"n0": 0.0}, locked=locked), SECOND, [("speed", "n0")])
 
 
-def run_chain(count: int) -> NetworkRun:
-    """Run a chain of `count` inertias on shafts: 2 count - 1 states."""
+def build_chain(count: int) -> tuple[list[Element], dict[str, Signal], Start]:
+    """Build a chain of `count` inertias on shafts: 2 count - 1 states."""
     elements = [
         *_build_inertias(count),
         *(
@@ -71,8 +71,12 @@ def run_chain(count: int) -> NetworkRun:
         build_element("torque", "T", node="n0", input="T"),
     ]
     inputs = {"T": Signal(np.array([0.0, 1.0]), np.array([50.0, 300.0]))}
-    start = Start({f"n{i}": 0.0 for i in range(count)})
-    return simulate(elements, inputs, start, SECOND, [("speed", "n0")])
+    return elements, inputs, Start({f"n{i}": 0.0 for i in range(count)})
+
+
+def run_chain(count: int) -> NetworkRun:
+    """Run a chain of `count` inertias on shafts."""
+    return simulate(*build_chain(count), SECOND, [("speed", "n0")])
 
 
 SIZES: dict[Callable[[int], NetworkRun], tuple[int, ...]] = {

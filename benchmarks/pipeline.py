@@ -1,34 +1,37 @@
 # SPDX-License-Identifier: MIT
 """CPU time and peak memory of whole commands, beside other programs in the same run.
 
-`python -m benchmarks.pipeline [--large] [--write]`: each command is a process of its own on one
-BLAS thread. `--large` adds the CSV log of one hour and the MDF file of 0.3 GB, `--write` writes
-docs/benchmarks-pipeline.md with a profile of each command that misses its limit. The other
-programs are pandas (its process, imports included), and a fit by SciPy's least squares with a
-simulator in C (`peers/run_identify.py` of the shared data, where that is at hand).
+`python -m benchmarks.pipeline [--large]` writes benchmarks/results/pipeline.json with a profile of
+each command that misses its limit; `python -m tools.results_page` builds
+docs/benchmarks-pipeline.md from it. Each command is a process of its own on one BLAS thread.
+`--large` adds the CSV log of one hour and the MDF file of 0.3 GB. The other programs are pandas
+(its process, imports included), and a fit by SciPy's least squares with a simulator in C
+(`peers/run_identify.py` of the shared data, where that is at hand).
 """
 
 from __future__ import annotations
 
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from benchmarks.code_version import read_commit
+from benchmarks.code_version import ROOT
 from benchmarks.large_logs import write_large_csv, write_large_mdf
 from benchmarks.pipeline_profile import PROFILE_MARK
+from benchmarks.raw_results import write_results
 from benchmarks.whole_drives import DRIVES, write_drive
 
-ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared"
-PAGE = ROOT / "docs" / "benchmarks-pipeline.md"
-REPEATS = 3
-"""Runs of each command; the shortest counts, as other work on the machine only adds."""
+REPEATS, TURNS = 3, 5
+"""Runs of each command, and of each of two programs in turns; the shortest counts."""
+CLOCK = (
+    "CPU time of the whole process, imports included, unless a row says otherwise; the "
+    f"shortest run. A command and its other program take {TURNS} turns."
+)
 
 _FIT = """
 import sys, time
@@ -78,28 +81,6 @@ class Measurement:
             return True
         return self.seconds <= self.ratio_limit * self.peer
 
-    def format_row(self) -> str:
-        """Return the row of the table."""
-        peer = "–" if self.peer is None else f"{self.peer:.2f}"
-        ratio = "–" if self.peer is None else f"{self.seconds / self.peer:.1f}"
-        limits = f"{self.limit:g} s" + (f", {self.ratio_limit:g} ×" if self.ratio_limit else "")
-        verdict = "met" if self.is_met else "missed"
-        cells = (self.name, f"{self.seconds:.2f}", f"{self.memory:.2f}", peer, ratio, limits)
-        return f"| {' | '.join((*cells, verdict))} |"
-
-
-_HEAD = """# Time of whole commands
-
-Written by `python -m benchmarks.pipeline --large --write`. CPU seconds of the whole process,
-imports included, unless a row says otherwise; the shortest of {repeats} runs; one BLAS thread; the
-other program in the same run. Memory is the largest of a process.
-
-Measured on: {machine}; Python {python}; load average {load:.1f}; code of commit {commit}.
-
-| command | CPU s | GB | other program s | ratio | limit | |
-|---|---|---|---|---|---|---|
-"""
-
 
 def run_process(
     command: Sequence[str], variables: Mapping[str, str] | None = None
@@ -132,13 +113,19 @@ def measure_command(
     name: str,
     arguments: Sequence[str],
     limit: float,
-    peer: float | None = None,
+    peer: Callable[[], float] | None = None,
     ratio_limit: float | None = None,
 ) -> Measurement:
-    """Measure `drivetwin` with these arguments; profile it where it misses a limit."""
+    """Measure `drivetwin` with these arguments; profile it where it misses a limit.
+
+    `peer` runs the other program once and returns its time [s].
+    """
     command = [sys.executable, "-m", "drivetwin", *arguments]
-    taken = min(run_process(command)[:2] for _ in range(REPEATS))
-    measured = Measurement(name, *taken, limit, peer, ratio_limit)
+    runs, others = [], []
+    for _ in range(TURNS if peer else REPEATS):
+        others += [peer()] if peer else []
+        runs.append(run_process(command)[:2])
+    measured = Measurement(name, *min(runs), limit, min(others, default=None), ratio_limit)
     if measured.is_met:
         return measured
     command[2] = "benchmarks.pipeline_profile"
@@ -163,20 +150,20 @@ def measure_script(script: str, *arguments: str) -> tuple[float, float]:
 def measure_peer_fit() -> float:
     """Return the CPU time [s] of the fit of `run_identify.py`."""
     script = str(SHARED / "peers" / "run_identify.py")
-    texts = [run_process([sys.executable, script])[2] for _ in range(REPEATS)]
-    return min(float(text.split()[1]) for text in texts)
+    return float(run_process([sys.executable, script])[2].split()[1])
 
 
 def measure_paper_log(folder: Path) -> Iterator[Measurement]:
     """Measure the commands on `paper_like.csv`."""
     log = str(SHARED / "logs" / "paper_like.csv")
     card = str(ROOT / "examples" / "vehicles" / "paper_like.toml")
-    peer = measure_peer_fit()
     out = str(folder / "out")
     identify = ("identify", log, "--vehicle", card, "-o", out)
-    yield measure_command("`--help`", ["--help"], 0.2)
+    yield measure_command("`--help`", ["--help"], 0.15)
     yield measure_completion()
-    yield measure_command("`identify`", identify, 2.5, peer, 8.0)
+    whole = measure_command("`identify`", identify, 2.5, measure_peer_fit, 8.0)
+    yield whole
+    peer = whole.peer or 0.0
     fit = measure_script(_FIT, log, card)
     yield Measurement("fit with intervals alone", *fit, 3.0 * peer, peer, 3.0)
     yield measure_command("`identify --method paper`", [*identify, "--method", "paper"], 1.3)
@@ -199,26 +186,16 @@ def measure_large_files(folder: Path) -> Iterator[Measurement]:
     """Measure `inspect` on large files."""
     csv, mf4 = folder / "hour.csv", folder / "large.mf4"
     write_large_csv(csv)
-    parsed, _ = measure_script(_PANDAS, str(csv))
+
+    def parse() -> float:
+        return float(run_process([sys.executable, "-c", _PANDAS, str(csv)])[2])
+
     yield measure_command(
-        "`inspect`, CSV of 1 h × 1 kHz × 7", ["inspect", str(csv)], 12.0, parsed, 4.0
+        "`inspect`, CSV of 1 h × 1 kHz × 7", ["inspect", str(csv)], 12.0, parse, 3.5
     )
     csv.unlink()
     write_large_mdf(mf4)
     yield measure_command("`inspect`, MDF 4 of 0.3 GB", ["inspect", str(mf4)], 5.0)
-
-
-def format_rows(rows: Sequence[Measurement]) -> str:
-    """Return the rows of the table, and below it the profiles."""
-    text = "\n".join(one.format_row() for one in rows) + "\n"
-    profiled = [one for one in rows if one.profile]
-    if not profiled:
-        return text
-    text += (
-        "\n## Where the time goes\n\nShares of the CPU time of the commands above that miss a "
-        "limit, by `python -m benchmarks.pipeline_profile COMMAND`.\n"
-    )
-    return text + "".join(f"\n{one.name}:\n\n```text\n{one.profile}```\n" for one in profiled)
 
 
 def main() -> int:
@@ -233,16 +210,9 @@ def main() -> int:
         for part in parts:
             for one in part(Path(folder)):
                 rows.append(one)
-                print(one.format_row(), flush=True)
-    if "--write" in sys.argv:
-        head = _HEAD.format(
-            repeats=REPEATS,
-            machine=f"{os.cpu_count()} × {platform.machine()}, {platform.system()}",
-            python=platform.python_version(),
-            load=os.getloadavg()[0],
-            commit=read_commit(),
-        )
-        PAGE.write_text(head + format_rows(rows), "utf-8")
+                print(f"{one.name}: {one.seconds:.2f} s", flush=True)
+    found = {"commands": [asdict(one) for one in rows]}
+    print(write_results("pipeline", found, clock=CLOCK, rounds=REPEATS))
     return 0 if all(one.is_met for one in rows) else 1
 
 

@@ -11,7 +11,8 @@ import sys
 from pathlib import Path
 
 from tools.budget import check_budget
-from tools.tidy_rules import core, files, imports, prose, texts, units, words
+from tools.results_page import describe_age
+from tools.tidy_rules import core, figures, files, imports, prose, texts, units, words
 from tools.tidy_rules.base import Fault, Rule, Tree, read_tree
 
 RULES: tuple[Rule, ...] = (
@@ -19,6 +20,7 @@ RULES: tuple[Rule, ...] = (
     core.check_purity,
     core.check_layers,
     core.check_circles,
+    figures.check_figures,
     files.check_lines,
     files.check_bytes,
     files.check_tests,
@@ -45,6 +47,8 @@ def main() -> int:
     faults = check(tree)
     for fault in faults:
         print(fault)
+    for warning in describe_age(tree.root):
+        print(f"warning: {warning}")
     print(f"{imports.describe_circles(tree)}; {prose.describe_names(tree)}")
     print(f"tidy: {len(tree.sources)} files, {len(faults)} faults")
     return 1 if faults else 0

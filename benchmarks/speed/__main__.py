@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Run the comparison, print it and write docs/benchmarks.md.
+"""Run the comparison and write benchmarks/results/speed.json.
 
-`python -m benchmarks.speed [--rounds N] [--no-build] [--no-write]`
+`python -m benchmarks.speed [--rounds N] [--no-build]`; `python -m tools.results_page` builds
+docs/benchmarks.md from it.
 """
 
 from __future__ import annotations
@@ -11,17 +12,22 @@ import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.raw_results import write_results
 from benchmarks.speed import c_peer, general, shift
-from benchmarks.speed.batch import measure_batches
-from benchmarks.speed.core import ROOT, Example
-from benchmarks.speed.instructions import format_instructions
-from benchmarks.speed.measure import Entry, Measured, measure
-from benchmarks.speed.page import format_limits, format_page
+from benchmarks.speed.batch import SEED, measure_batches
+from benchmarks.speed.core import Example
+from benchmarks.speed.instructions import measure_instructions
+from benchmarks.speed.measure import Entry, measure
 from tests.support.upshift import reference
 from tests.support.upshift.scenario import Scenario, build_scenario
 from tests.support.upshift.statement import Inputs, Problem, make_inputs, make_problem
 
-PAGE = ROOT / "docs" / "benchmarks.md"
+CLOCK = (
+    "Programs take turns in each round, of which the shortest run of each is kept: CPU time of the "
+    "process, inside Rust the time on the clock. Batches on two threads are timed by the clock on "
+    "the wall."
+)
+FLAGS = " ".join(c_peer.FLAGS)
 
 
 def main() -> int:
@@ -35,17 +41,19 @@ def main() -> int:
         stated = build_scenario(of, given)
         entries = _collect_entries(of, given, example, stated)
         measured = measure(entries, options.rounds, _show_progress)
-        extra = {
-            "What was set out to be reached": format_limits(measured),
-            "Many runs": measure_batches(of, given, folder),
-            "Instructions": format_instructions(of, given, example, stated, folder),
-            "Growth": general.format_growth(stated, example),
+        _show_progress("batches, instructions, growth")
+        found = {
+            "entries": [one.collect() for one in measured],
+            "gearbox_span": float(general.plan_gearbox_shifts()[general.WHOLE].time[-1]),
+            "batch": measure_batches(of, given, folder),
+            "instructions": measure_instructions(of, given, example, stated, folder),
+            "growth": general.measure_growth(stated, example),
         }
-        text = format_page(measured, _find_base(measured), extra)
     _show_progress("")
-    print(text)
-    if options.write:
-        PAGE.write_text(text, encoding="utf-8")
+    path = write_results(
+        "speed", found, clock=CLOCK, rounds=options.rounds, seeds=(SEED,), flags={"gcc": FLAGS}
+    )
+    print(path)
     return 0
 
 
@@ -60,18 +68,11 @@ def _collect_entries(of: Problem, given: Inputs, example: Example, stated: Scena
     ]
 
 
-def _find_base(measured: list[Measured]) -> Measured | None:
-    return next((one for one in measured if one.entry.program == c_peer.PROGRAM), None)
-
-
 def _parse_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=25, help="how often to go round all entries")
     parser.add_argument(
         "--no-build", dest="build", action="store_false", help="take the example as it is"
-    )
-    parser.add_argument(
-        "--no-write", dest="write", action="store_false", help="print, but leave docs as they are"
     )
     return parser.parse_args()
 

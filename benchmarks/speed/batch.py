@@ -10,9 +10,9 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,14 +24,12 @@ from drivetwin.simulation.network_response import NetworkScenario, simulate_netw
 from tests.support.upshift.scenario import build_scenario
 from tests.support.upshift.statement import BAR, Inputs, Problem, make_inputs, make_problem, start
 
-RUNS = 1000
+RUNS, SEED = 1000, 1
 _SPREAD = 0.05
 _VARIED = (0, 2, 3, 10, 11, 12, 13, 14, 17, 18, 19)
 """J_e, J_v, η, T_v, k, c, both gains, mu_s, mu_c, v_s in the order of the C program."""
 _THREADS = (1, 2)
-_LIMIT = 10.0
-"""Runs per second over those of C, on the most threads."""
-_ROUNDS, _FINE_STEPS = 15, 20
+_ROUNDS, FINE_STEPS = 15, 20
 _MEMORY_RUNS = (2000, 10_000)
 _KEPT: dict[Keep, str] = {
     Keep.COLUMNS: "T_o at every sample",
@@ -39,21 +37,9 @@ _KEPT: dict[Keep, str] = {
 }
 
 
-@dataclass
-class Rates:
-    """Times of the passes of one program over all sets [s], by number of threads."""
-
-    program: str
-    seconds: dict[int, list[float]]
-
-    def rate(self, threads: int) -> float:
-        """Median runs per second."""
-        return RUNS / float(np.median(self.seconds[threads]))
-
-
 def draw_sets(of: Problem, runs: int = RUNS) -> FloatArray:
     """Return parameters (runs, 21) of a fixed seed, in the order of the C program."""
-    noise = np.random.default_rng(1)
+    noise = np.random.default_rng(SEED)
     numbers = np.tile(c_peer.list_parameters(of), (runs, 1))
     for column in _VARIED:
         numbers[:, column] *= 1.0 + _SPREAD * noise.standard_normal(runs)
@@ -75,34 +61,37 @@ def simulate_sets(of: Problem, given: Inputs, sets: FloatArray, how: tuple[Keep,
     )
 
 
-def measure_batches(of: Problem, given: Inputs, folder: Path) -> str:
-    """Measure runs per second, errors and memory, the programs in turns."""
+def measure_batches(of: Problem, given: Inputs, folder: Path) -> dict[str, Any]:
+    """Measure seconds of whole batches, errors and memory, the programs in turns.
+
+    One thread is measured by CPU time; several are by the clock on the wall.
+    """
     sets, library = draw_sets(of), c_peer.load_library(folder)
-    ours = Rates(shift.PROGRAM, {threads: [] for threads in _THREADS})
-    theirs = Rates(c_peer.PROGRAM, {threads: [] for threads in _THREADS})
+    programs: dict[str, Callable[[int], FloatArray]] = {
+        shift.PROGRAM: lambda threads: simulate_sets(
+            of, given, sets, (Keep.COLUMNS, threads)
+        ).values[:, 0]
+    }
+    if library is not None:
+        programs[c_peer.PROGRAM] = lambda threads: library.run_batch(sets, of, given, (threads, 1))
     # Once beforehand: the first calls of a process wait for its memory.
-    found = simulate_sets(of, given, sets, (Keep.COLUMNS, max(_THREADS)))
+    torques = {name: run(max(_THREADS)) for name, run in programs.items()}
+    seconds: dict[str, dict[str, list[float]]] = {
+        name: {str(threads): [] for threads in _THREADS} for name in programs
+    }
     for _ in range(_ROUNDS):
         for threads in _THREADS:
-            begin = time.perf_counter()
-            found = simulate_sets(of, given, sets, (Keep.COLUMNS, threads))
-            ours.seconds[threads].append(time.perf_counter() - begin)
-            if library is not None:
-                begin = time.perf_counter()
-                rough = library.run_batch(sets, of, given, (threads, 1))
-                theirs.seconds[threads].append(time.perf_counter() - begin)
-    if library is None:
-        return "\n".join([_format_table([ours], None), _measure_memory()])
-    exact = library.run_batch(sets, of, given, (max(_THREADS), _FINE_STEPS))
-    lines = [
-        f"Errors of T_o over {RUNS} runs [N·m], against C at {_FINE_STEPS} steps per sample:\n",
-        "| program | median | 99 % | worst | failed |",
-        "|---|---|---|---|---|",
-        _format_errors(theirs.program, rough, exact),
-        _format_errors(ours.program, found.values[:, 0], exact),
-        "",
-    ]
-    return "\n".join([_format_table([theirs, ours], theirs), *lines, _measure_memory()])
+            clock = time.process_time if threads == 1 else time.perf_counter
+            for name, run in programs.items():
+                begin = clock()
+                run(threads)
+                seconds[name][str(threads)].append(clock() - begin)
+    found: dict[str, Any] = {"runs": RUNS, "seconds": seconds, "memory": _measure_memory()}
+    if library is not None:
+        exact = library.run_batch(sets, of, given, (max(_THREADS), FINE_STEPS))
+        found["fine_steps"] = FINE_STEPS
+        found["errors"] = {name: _rate_errors(one, exact) for name, one in torques.items()}
+    return found
 
 
 def _name_columns(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, FloatArray]:
@@ -127,45 +116,24 @@ def _name_columns(of: Problem, given: Inputs, sets: FloatArray) -> dict[str, Flo
     }
 
 
-def _format_table(rates: Sequence[Rates], base: Rates | None) -> str:
-    lines = [
-        "| program | threads | runs per second | times C | of the shortest passes |",
-        "|---|---|---|---|---|",
-    ]
-    for one in rates:
-        for threads in _THREADS:
-            rate = one.rate(threads)
-            times = ["", ""] if base is None else _format_ratios(one, base, threads)
-            lines.append(f"| {one.program} | {threads} | {rate:,.0f} | {' | '.join(times)} |")
-    lines.append(f"\nSet out to be reached: {_LIMIT:g} times C on {max(_THREADS)} threads.")
-    return "\n".join(lines) + "\n"
-
-
-def _format_ratios(one: Rates, base: Rates, threads: int) -> list[str]:
-    """Return the rates over those of another program, by medians and by the shortest passes."""
-    medians = one.rate(threads) / base.rate(threads)
-    shortest = min(base.seconds[threads]) / min(one.seconds[threads])
-    return [f"{medians:.3g}", f"{shortest:.3g}"]
-
-
-def _format_errors(program: str, torques: FloatArray, exact: FloatArray) -> str:
+def _rate_errors(torques: FloatArray, exact: FloatArray) -> dict[str, float]:
+    """Return quantiles of the largest errors of the runs [N m], and how many failed."""
     worst = np.abs(torques - exact).max(axis=1)
     known = worst[np.isfinite(worst)]
-    levels = (np.median(known), np.quantile(known, 0.99), known.max())
-    shown = " | ".join(f"{level:.2g}" for level in levels)
-    return f"| {program} | {shown} | {worst.size - known.size} |"
+    median, most = (float(np.quantile(known, share)) for share in (0.5, 0.99))
+    failed = worst.size - known.size
+    return {"median": median, "99 %": most, "worst": float(known.max()), "failed": failed}
 
 
-def _measure_memory() -> str:
+def _measure_memory() -> dict[str, float]:
     """Measure bytes per run, from the largest memory of processes with few and with many runs."""
     if not Path("/proc/self/status").exists():
-        return "Memory is measured on Linux only.\n"
-    lines = ["Memory of a batch, per run:\n", "| kept | bytes per run |", "|---|---|"]
-    for keep, what in _KEPT.items():
+        return {}
+    found = {}
+    for keep, name in _KEPT.items():
         few, many = _measure_peak(keep, _MEMORY_RUNS[0]), _measure_peak(keep, _MEMORY_RUNS[1])
-        per_run = (many - few) / (_MEMORY_RUNS[1] - _MEMORY_RUNS[0])
-        lines.append(f"| {what} | {per_run:,.0f} |")
-    return "\n".join(lines) + "\n"
+        found[name] = (many - few) / (_MEMORY_RUNS[1] - _MEMORY_RUNS[0])
+    return found
 
 
 def _measure_peak(keep: Keep, runs: int) -> int:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import ctypes
 import os
 import subprocess
+import tempfile
 import time
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +41,7 @@ class Library:
         )
         # Its threads wait without spinning, which would take the processor from the other programs.
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-        self._library = ctypes.CDLL(str(self.path))
+        self.functions = ctypes.CDLL(str(self.path))
 
     def time_runs(self, of: Problem, given: Inputs, substeps: int, repeats: int) -> Sample:
         """Time single runs; return also the solution."""
@@ -49,7 +51,7 @@ class Library:
             stack_samples(given),
         )
         columns, events = np.zeros((SAMPLES, 4)), np.zeros(_MOST_EVENTS)
-        call = self._library.shift_sim
+        call = self.functions.shift_sim
         arguments = (
             *(_get_pointer(each) for each in (numbers, first, samples)),
             *(SAMPLES - 1, ctypes.c_double(STEP), substeps),
@@ -57,9 +59,9 @@ class Library:
         )
         seconds = []
         for _ in range(repeats):
-            begin = time.perf_counter()
+            begin = time.process_time()
             count = call(*arguments)
-            seconds.append(time.perf_counter() - begin)
+            seconds.append(time.process_time() - begin)
         return Sample(seconds, Solution(columns.T.copy(), events[:count].copy()))
 
     def run_batch(
@@ -72,7 +74,7 @@ class Library:
         threads, substeps = how
         torques = np.zeros((len(sets), SAMPLES))
         first, samples = np.array(start(of, given)), stack_samples(given)
-        self._library.shift_batch(
+        self.functions.shift_batch(
             _get_pointer(sets),
             len(sets),
             *(_get_pointer(first), _get_pointer(samples)),
@@ -80,6 +82,13 @@ class Library:
             *(_get_pointer(torques), threads),
         )
         return torques
+
+
+@cache
+def find_library() -> Library | None:
+    """Compile the program once for all; return None if its source is not beside the repository."""
+    with tempfile.TemporaryDirectory() as folder:
+        return load_library(Path(folder))
 
 
 def load_library(folder: Path) -> Library | None:

@@ -32,13 +32,6 @@ _REPEATS, _GROWTH_REPEATS = 10, 15
 _ADDED_INERTIA, _ADDED_STIFFNESS, _ADDED_DAMPING = 50.0, 2e5, 200.0
 _ADDED_DRAG = {"gain": 1e-3, "p0": 0.0, "peak": 1.0, "drum_inertia": 0.0}
 _COUPLED_OUTPUTS: tuple[Output, ...] = tuple(("speed", f"w{n}") for n in range(1, 5))
-_GROWTH_HEAD = """\
-Time of one run inside Rust, network ready, over the number of samples of inputs and outputs, of
-states, and of clutches that slip; each new clutch brings two states.
-
-| what grows | size: time of a run [µs] |
-|---|---|
-"""
 
 
 def make_entries(shift: Scenario, example: Example) -> list[Entry]:
@@ -186,8 +179,11 @@ def _compare_with_reference() -> Judge:
     return compare
 
 
-def format_growth(shift: Scenario, example: Example) -> str:
-    """Measure one size after the other, inside Rust, network ready; return the table."""
+def measure_growth(shift: Scenario, example: Example) -> dict[str, dict[str, float]]:
+    """Measure one size after the other, inside Rust, network ready.
+
+    Returns the shortest time of a run [s] by what grows and by its size.
+    """
     cases = {
         "samples": {
             round(1.5 * rate) + 1: resample(shift, rate) for rate in (250, 500, 1000, 2000, 4000)
@@ -195,15 +191,13 @@ def format_growth(shift: Scenario, example: Example) -> str:
         "states": {4 + 2 * count: add_shafts(shift, count) for count in range(6)},
         "clutches": {2 + count: add_brakes(shift, count) for count in range(5)},
     }
-    rows = []
+    found: dict[str, dict[str, float]] = {}
     for name, scenarios in cases.items():
-        texts = []
+        found[name] = {}
         for size, scenario in scenarios.items():
             path = example.store(f"{name}{size}", scenario)
-            seconds = example.run(path, _GROWTH_REPEATS, "again").seconds
-            texts.append(f"{size}: {1e6 * float(np.median(seconds)):.3g}")
-        rows.append(f"| {name} | {', '.join(texts)} |\n")
-    return _GROWTH_HEAD + "".join(rows)
+            found[name][str(size)] = min(example.run(path, _GROWTH_REPEATS, "again").seconds)
+    return found
 
 
 def resample(shift: Scenario, rate: float) -> Scenario:

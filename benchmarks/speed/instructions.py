@@ -29,27 +29,18 @@ int main(int count, char **names) {{
 """
 
 
-def format_instructions(
+def measure_instructions(
     of: Problem, given: Inputs, example: Example, stated: Scenario, folder: Path
-) -> str:
-    """Return both counts with their ratio, or the reason why there is none."""
+) -> dict[str, int]:
+    """Return the instructions of one shift by program; none where valgrind is missing."""
     if shutil.which("valgrind") is None:
-        return "Not counted: valgrind is not installed.\n"
-    ours = count_instructions(
-        [str(example.path), str(example.store("counted", stated)), "0"], "*Plan*run_again", folder
-    )
-    lines = [
-        "Counted by callgrind, which knows instructions up to AVX2.\n",
-        "| program | instructions of one shift | ratio |",
-        "|---|---|---|",
-    ]
+        return {}
+    ours = [str(example.path), str(example.store("counted", stated)), "0"]
+    found = {"drivetwin": count_instructions(ours, "*Plan*run_again", folder)}
     if c_peer.SOURCE.exists():
-        theirs = count_instructions(_build_driver(of, given, folder), "shift_sim", folder)
-        lines.append(f"| {c_peer.PROGRAM}, 1 ms | {theirs:,} | 1 |")
-        lines.append(f"| drivetwin, first run of a network | {ours:,} | {ours / theirs:.3g} |")
-    else:
-        lines.append(f"| drivetwin, first run of a network | {ours:,} | |")
-    return "\n".join(lines) + "\n"
+        driver = _build_driver(of, given, folder)
+        found[c_peer.PROGRAM] = count_instructions(driver, "shift_sim", folder)
+    return found
 
 
 def count_instructions(command: list[str], function: str, folder: Path) -> int:

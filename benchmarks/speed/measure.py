@@ -3,18 +3,18 @@
 
 from __future__ import annotations
 
-import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 from tests.support.upshift.statement import Solution
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Seconds of some runs, one by one, and what the last of them found."""
+    """Seconds of some runs, one by one, and the solution of the last of them."""
 
     seconds: Sequence[float]
     solution: Solution | None
@@ -57,35 +57,32 @@ class Entry:
 
 @dataclass
 class Measured:
-    """All seconds of an entry."""
+    """Shortest time of a run in each round [s], and the last solution."""
 
     entry: Entry
     seconds: list[float] = field(default_factory=list)
     solution: Solution | None = None
 
-    @property
-    def quality(self) -> Quality | None:
-        """Error of the last solution."""
-        return None if self.solution is None else self.entry.judge(self.solution)
-
-    @property
-    def median(self) -> float:
-        """Median time of a run [s]."""
-        return statistics.median(self.seconds)
-
-    @property
-    def least(self) -> float:
-        """Shortest time of a run [s]; on a busy machine nearer to the truth."""
-        return min(self.seconds)
+    def collect(self) -> dict[str, Any]:
+        """Collect the raw result of the entry."""
+        quality = None if self.solution is None else self.entry.judge(self.solution)
+        error = quality and {"error": quality.error, "unit": quality.unit, "events": quality.events}
+        return {
+            "group": self.entry.group.value,
+            "program": self.entry.program,
+            "setting": self.entry.setting,
+            "seconds": self.seconds,
+            **(error or {}),
+        }
 
 
 def time_runs(run: Callable[[], Solution], repeats: int) -> Sample:
-    """Time `repeats` runs, the conversion of the last result to a Solution not among them."""
+    """Time `repeats` runs by the CPU time of the process."""
     seconds = []
     for _ in range(repeats):
-        begin = time.perf_counter()
+        begin = time.process_time()
         result = run()
-        seconds.append(time.perf_counter() - begin)
+        seconds.append(time.process_time() - begin)
     return Sample(seconds, result)
 
 
@@ -97,6 +94,6 @@ def measure(entries: Sequence[Entry], rounds: int, tell: Callable[[str], None]) 
             if number < one.entry.rounds:
                 tell(f"round {number + 1}/{rounds}: {one.entry.program} {one.entry.setting}")
                 sample = one.entry.run()
-                one.seconds += sample.seconds
+                one.seconds.append(min(sample.seconds))
                 one.solution = sample.solution or one.solution
     return found

@@ -14,7 +14,7 @@ from tests.support.upshift.equations import FIRST_MODE, Equations, Guard, Mode
 from tests.support.upshift.statement import SAMPLES, STEP, Solution
 
 _MOST_EVENTS = 100
-Method = Literal["RK45", "LSODA"]
+Method = Literal["RK45", "LSODA", "Radau"]
 
 
 def solve(
