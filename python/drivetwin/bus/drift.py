@@ -136,14 +136,8 @@ def fit_noise(
     sizes = [rms / np.sqrt(float(np.trace(one)) / left.size) for one in parts]
     given = [] if start is None else [start.white, start.drift, start.swing][: 1 + len(parts)]
     first = np.maximum(given or [0.5 * rms, *(0.5 * one for one in sizes)], _LOWEST * rms)
-    if swing is None and known is None:
-        strength, axes = np.linalg.eigh(parts[0])
-        likelihood: _Diagonal | _Dense = _Diagonal(
-            np.maximum(strength, 0.0), (axes.T @ left) ** 2, floor
-        )
-    else:
-        base = np.zeros_like(parts[0]) if known is None else rest.T @ known @ rest
-        likelihood = _Dense(parts, base, left, floor)
+    base = np.zeros_like(parts[0]) if known is None else rest.T @ known @ rest
+    likelihood = _Likelihood(parts, base, left, floor)
     largest = np.log(np.array([rms, *sizes]) * 1e2)
     bounds = list(zip(np.minimum(np.log(first), largest) - 9.0, largest, strict=True))
     made = minimize(
@@ -158,24 +152,7 @@ def fit_noise(
 
 
 @dataclass(frozen=True, eq=False)
-class _Diagonal:
-    """Negative log likelihood of white noise and one part, in the axes (m,) of the part."""
-
-    strength: FloatArray
-    squares: FloatArray
-    floor: float
-
-    def evaluate(self, logs: FloatArray) -> tuple[float, FloatArray]:
-        """Value and gradient by the logarithms of both sizes."""
-        size = np.exp(2.0 * logs)
-        variance = size[0] + self.floor**2 + size[1] * self.strength
-        slope = 0.5 * (1.0 - self.squares / variance) / variance
-        gradient = 2.0 * size * np.array([slope.sum(), slope @ self.strength])
-        return 0.5 * float(np.sum(np.log(variance) + self.squares / variance)), gradient
-
-
-@dataclass(frozen=True, eq=False)
-class _Dense:
+class _Likelihood:
     """Negative log likelihood of white noise and several parts (m, m); that of `base` is known."""
 
     parts: list[FloatArray]
