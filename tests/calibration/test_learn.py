@@ -94,3 +94,24 @@ def test_a_log_of_another_vehicle_is_refused_with_the_value_that_contradicts(
     assert caught.value.where is not None
     assert str(caught.value.where.file).endswith("bench-1.csv")
     assert "identify it again" in caught.value.remedy
+
+
+def test_pressures_that_act_late_are_found_and_move_no_other_value(
+    twin: Twin, tmp_path: Path
+) -> None:
+    """Stamps that are early by 4 ms are pressures that act as late."""
+    path, late = tmp_path / "bench.csv", 4e-3
+    write_bench_log(path, build_model(twin))
+    log = read_log(path, twin.build_card())
+    early = {
+        role: replace(one, time=one.time - late) if role.startswith("pressure.") else one
+        for role, one in log.channels.items()
+    }
+    found = correct_twin(twin, [replace(log, channels=early)], ("2", "3"), Spread())
+    delay = found.twin.parameters["p_delay"]
+    assert delay.value is not None
+    assert delay.std_total is not None
+    assert abs(delay.value - late) < 3.0 * delay.std_total < late
+    by_id = {one.id: one for one in found.values}
+    for name in ("eta", "J_vehicle", "k_o", "mu.B3"):
+        assert abs(by_id[name].after - by_id[name].before) < 3.0 * by_id[name].after_std

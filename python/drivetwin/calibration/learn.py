@@ -15,10 +15,10 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.spread import Spread
+from drivetwin.channels.roles import get_pressure_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.result.cause import Cause
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.validation import Validation
@@ -49,6 +49,8 @@ _OWN = ("Tv_over_if", "te_delay", "ratio", "final_drive")
 _OTHER_VEHICLE = (
     "check that the log is of this vehicle; else identify it again from a log of this shift"
 )
+_DELAYS = 3
+"""Identifications of a log, each with the pressures as late as the one before finds [count]."""
 _FAR = 5.0
 """Standard deviations of made units from which a value is one of another vehicle: one of 2 million
 units is as far."""
@@ -125,8 +127,8 @@ def correct_twin(
     unit = _describe_unit(twin, shift, spread)
     for log, some in zip(logs, shifts, strict=True):
         card = build_prior_card(after, log, unit)
-        found = identify(log, card, some)
-        corrected = _merge(after, build_twin(found, card), found.evidence.cause)
+        found, late = _identify(log, card, some, after.get_value(PRESSURE_DELAY, 0.0))
+        corrected = _merge(after, build_twin(found, card), late)
         _require_explained(attach_validation(found, corrected, log), log.source)
         after, unit = corrected, _describe_unit(corrected, shift)
         _require_unit(_describe_unit(twin, shift, spread), unit, log.source)
@@ -136,6 +138,32 @@ def correct_twin(
         for shift in some.shifts
     )
     return Correction(after, tuple(_list_values(twin, after, shift)), fits)
+
+
+def _identify(
+    log: ShiftLog, card: VehicleCard, shifts: FoundShifts, late: float
+) -> tuple[Identification, Estimate | None]:
+    """Identify with pressures that act `late` [s], and with those of each delay that the
+    identification names as the cause of a mismatch; return the last delay."""
+    delay = None
+    for _ in range(_DELAYS):
+        found = identify(_delay_pressures(log, late), card, shifts)
+        cause = found.evidence.cause
+        if cause is None or cause.group.effect is not EffectId.PRESSURE_DELAY:
+            break
+        late += cause.size
+        delay = assess(PRESSURE_DELAY, late, cause.std or 0.0, found.method.value)
+    return found, delay
+
+
+def _delay_pressures(log: ShiftLog, late: float) -> ShiftLog:
+    """Return the log with pressures at the times [s] at which they act."""
+    moved = {
+        role: replace(one, time=one.time + late)
+        for role, one in log.channels.items()
+        if get_pressure_element(role) is not None
+    }
+    return replace(log, channels={**log.channels, **moved})
 
 
 def _select_shifts(twin: Twin, log: ShiftLog, gears: tuple[str, str]) -> FoundShifts:
@@ -213,11 +241,11 @@ def _compute_scatter(known: ModelDistribution, spread: Spread) -> FloatArray:
     return np.asarray(np.transpose(columns) @ np.array(columns), dtype=np.float64)
 
 
-def _merge(old: Twin, new: Twin, cause: Cause | None) -> Twin:
+def _merge(old: Twin, new: Twin, late: Estimate | None) -> Twin:
     """Return the new twin with what its log does not determine as in the old one.
 
-    Added elements are those of the new log. Je = J′ - Jo′/i² is the same in all gears. A delay of
-    the pressures that is the `cause` of a mismatch joins the twin.
+    Added elements are those of the new log. Je = J′ - Jo′/i² is the same in all gears. `late` is
+    the delay of the pressures, None for that of the old twin.
     """
     kept = {
         name: one
@@ -225,9 +253,7 @@ def _merge(old: Twin, new: Twin, cause: Cause | None) -> Twin:
         if get_parameter_spec(name).stem in SIMULATED and name not in ADDED_ELEMENT_IDS
     }
     known = {name: one for name, one in new.parameters.items() if one.value is not None}
-    if cause is not None and cause.group.effect is EffectId.PRESSURE_DELAY:
-        late = assess(PRESSURE_DELAY, cause.size, cause.std or 0.0, new.method.value)
-        known |= {PRESSURE_DELAY: late} if late.value is not None else {}
+    known |= {} if late is None or late.value is None else {PRESSURE_DELAY: late}
     merged = replace(
         new,
         parameters={**kept, **known},
