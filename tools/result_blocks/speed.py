@@ -113,7 +113,7 @@ def _write_batch(raw: Raw) -> str:
 def _write_instructions(raw: Raw) -> str:
     counts = raw["instructions"]
     if not counts:
-        return "Not counted: valgrind was not installed.\n"
+        return "Not counted: valgrind was missing, or did not know all instructions of the build.\n"
     base = counts.get(_C)
     rows = [
         (program, f"{count:,}", f"{count / base:.3g}" if base else "")
