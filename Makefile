@@ -172,7 +172,7 @@ figures: $(venv)/.dev ## build what is timed, measure speed anew and build its p
 .PHONY: measure
 measure: export OPENBLAS_NUM_THREADS = 1
 measure: ## measure speed into benchmarks/results and build the pages from it
-	$(bin)/python -m benchmarks.speed --no-build
+	$(bin)/python -m benchmarks.speed --no-build --rounds 10
 	$(bin)/python -m benchmarks.precision
 	-$(bin)/python -m benchmarks.pipeline --large # fails where a limit is missed
 	$(bin)/python -m tools.results_page
