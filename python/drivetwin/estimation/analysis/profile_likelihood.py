@@ -157,15 +157,16 @@ def _hold_reported(
         return np.asarray(compute_jacobian(fit.problem, point, spread, signals)[place])
 
     row = compute_gradient(fit.point)
+    std = float(np.sqrt(max(float(row @ fit.covariance @ row), 0.0)))
     return HeldParameter(
         parameter,
         fit.problem,
         fit.point,
         fit.normal.cost,
         compute_value(fit.point),
-        float(np.sqrt(max(float(row @ fit.covariance @ row), 0.0))),
+        std,
         # Noise that is louder or slower than the sensors' shows the parameter less.
-        compute_variance_inflation(fit, row[None, :]),
+        compute_variance_inflation(fit, row[None, :]) if std > 0.0 else 1.0,
         compute_value,
         compute_gradient,
     )
