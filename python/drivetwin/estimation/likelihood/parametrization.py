@@ -199,7 +199,7 @@ class Tie:
     element: ShiftElementKinematics
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DualClutchPlant(RecordedPlant[TorqueRecord]):
     """Fixed description of one shift: its elements and every value that is not estimated.
 
