@@ -258,11 +258,13 @@ def _make_check(role: FileRole) -> Callable[[Any], Any]:
     """Make the check of the files of an argument: one, several or none."""
 
     def check(value: Any) -> Any:
+        if not value:  # of a file that is not given, as in each completion of a line
+            return value
         from drivetwin.cli.input_files import resolve_file  # it loads the readers
 
         if isinstance(value, list):
             return [resolve_file(one, role) for one in value]
-        return None if value is None else resolve_file(value, role)
+        return resolve_file(value, role)
 
     return check
 
