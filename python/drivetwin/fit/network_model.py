@@ -11,6 +11,7 @@ from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.places import Place, list_places
 from drivetwin.fit.starts import complete_start
 from drivetwin.fit.unknown import Unknown
+from drivetwin.simulation.element_schema import list_inputs
 from drivetwin.simulation.network import Element, InputValue, Output, Sine, Start
 
 
@@ -38,8 +39,12 @@ class NetworkModel:
         """Constant inputs [SI]."""
         return {name: one for name, one in self.inputs.items() if isinstance(one, int | float)}
 
-    def list_places(self, recorded: Iterable[str]) -> dict[str, Place]:
-        """List the numbers of the network and its channels, with the names of `recorded` inputs."""
+    def list_places(self, recorded: Iterable[str] | None = None) -> dict[str, Place]:
+        """List the numbers of the network and its channels, with the names of `recorded` inputs:
+        of all that are not constant where None."""
+        if recorded is None:
+            used = (name for one in self.elements for name in list_inputs(one))
+            recorded = (name for name in dict.fromkeys(used) if name not in self.inputs)
         channels = [
             *(name for name, one in self.inputs.items() if not isinstance(one, int | float | Sine)),
             *recorded,

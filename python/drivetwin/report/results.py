@@ -104,7 +104,7 @@ class MadeResult:
             [
                 (known[one.name].std_noise or 0.0)
                 / (known[one.name].minimum if one.is_positive else 1.0)
-                for one in network.resolve(network.list_places(())).sought
+                for one in network.resolve(network.list_places()).sought
             ]
         )
 
