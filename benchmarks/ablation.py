@@ -63,6 +63,7 @@ GROUPS: Mapping[str, tuple[EffectId, ...]] = {
     "effects: torque sensor": (
         *(EffectId.OUTPUT_TORQUE_OFFSET, EffectId.OUTPUT_TORQUE_DRIFT),
         *(EffectId.OUTPUT_TORQUE_DELAY, EffectId.OUTPUT_TORQUE_CURVE),
+        EffectId.OUTPUT_TORQUE_FILTER,
     ),
     "effects: speed sensors": (EffectId.SPEED_RUN_OUT,),
     "effects: inputs": (EffectId.PRESSURE_DELAY, EffectId.TORQUE_LAG, EffectId.TORQUE_MAP),

@@ -67,14 +67,6 @@ def test_the_truth_is_within_three_deviations(folder: Path) -> None:
         assert abs(one["minimum"] - true) < 3.0 * one["std_noise"], name
 
 
-def test_a_fit_predicts_a_log_with_its_sensors(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    log = folder / "other.csv"
-    assert main(["simulate", str(folder / "out"), str(log), "--json"]) == 0
-    assert 0.8 < json.loads(capsys.readouterr().out)["chi2"] < 1.3
-
-
 def test_the_page_names_unknowns_and_held_out_logs_and_opens_offline(folder: Path) -> None:
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     anchors = re.findall(r'<section id="([^"]+)"', page)
