@@ -135,7 +135,7 @@ def identify(page: Page) -> None:
     show_view(page, "identify")
     page.click("#identify")
     expect(page.locator("#progress-box")).to_be_visible()
-    expect(page.locator("#status")).to_contain_text("likelihood")
+    expect(page.locator("#status")).to_contain_text("identified", timeout=180_000)
     expect(page.locator("#identify")).to_be_enabled(timeout=180_000)
 
 

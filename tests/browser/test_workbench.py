@@ -264,7 +264,7 @@ def test_a_tab_that_is_loaded_again_keeps_its_work(
     bench.shown(tab := context.new_page())
     tab.close()
     shown.reload()
-    expect(shown.locator("#status")).to_contain_text("identified: likelihood")
+    expect(shown.locator("#status")).to_contain_text("identified")
 
 
 @pytest.mark.parametrize(("answer", "text"), [(None, "does not answer"), (500, "internal error")])
