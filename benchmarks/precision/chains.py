@@ -16,6 +16,7 @@ from tests.support.upshift.scenario import Scenario
 
 SIZES = (10, 20, 50, 100, 200)
 _REPEATS = 10
+"""Runs of which the shortest counts [count]: others on the machine only lengthen a run."""
 
 
 def measure_chains(rounds: int) -> dict[str, dict[str, float]]:

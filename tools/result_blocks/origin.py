@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a benchmark was measured on and with, and tables of Markdown."""
+"""Machine, compilers and versions of a measurement, and tables of Markdown."""
 
 from __future__ import annotations
 

@@ -22,8 +22,9 @@ from tests.support.upshift.scenario import Scenario, build_scenario
 NAME = "drivetwin"
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 REPEATS = 100
+"""Runs of which the shortest counts [count]: others on the machine only lengthen a run."""
 Choose = Callable[[FloatArray], FloatArray]
-"""What a problem rates of columns (outputs, n)."""
+"""Selects the rated part of the columns (outputs, n) of a problem."""
 
 
 class Ready:
