@@ -30,8 +30,8 @@ PACKAGE = "python/drivetwin"
 FOLDER = ROOT / "out" / "covering"
 MODULES = (
     "simulation/network.py",
-    "estimation/optimize/gauss_newton.py",
-    "estimation/likelihood/noise/residual_covariance.py",
+    "likelihood/gauss_newton.py",
+    "likelihood/residual_covariance.py",
     "estimation/result/verdict.py",
     "logs/formats/csv.py",
     "_util/atomic.py",

@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.output import IndexArray
 from drivetwin.estimation.likelihood.motion import simulate_motion
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.likelihood.output import IndexArray
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
 from drivetwin.simulation.dual_clutch import Signal
 from tests.support.bench import Bench
 

@@ -30,8 +30,8 @@ from drivetwin.channels.filling import Filling, Interpolation
 from drivetwin.channels.units import find_unit
 from drivetwin.dyno.scenario_file import convert_channels
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.likelihood.measured_signal import estimate_white_noise
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log

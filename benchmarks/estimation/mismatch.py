@@ -17,7 +17,8 @@ from benchmarks.estimation.study import fit_likelihood, read_fit
 from drivetwin.channels.roles import get_pressure_element
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
+from drivetwin.estimation.data.shift_data import ShiftSignals
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
 from tests.support.bench import Bench, Knowledge, record_bench
 

@@ -18,7 +18,7 @@ from drivetwin.estimation.data.shift_data import DesignData, ShiftSignals
 from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
+from drivetwin.estimation.likelihood.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.parametrization import LAW, DualClutchProblem
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.select_model import select_model
@@ -26,7 +26,7 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
 )
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.spec import PriorValue
 from tests.support.bench import Bench, Knowledge, record_bench

@@ -19,18 +19,19 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
-from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
+from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE, TORQUE, build_record
 from drivetwin.estimation.likelihood.parametrization import LAW, TE_OFFSET, DualClutchTerm
 from drivetwin.estimation.likelihood.priors import split_spans
 from drivetwin.estimation.likelihood.selection.sampling_mode import SPEEDS, get_modes
-from drivetwin.estimation.likelihood.term import RecordedTerm
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE, TORQUE, build_record
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.estimation.result.verdict import VERDICT
+from drivetwin.likelihood.measured_signal import MeasuredSignal
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts

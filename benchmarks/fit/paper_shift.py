@@ -19,16 +19,16 @@ from benchmarks.estimation.study import SLIPS, compute_guess, propagate
 from benchmarks.fit.report import format_header, format_row
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.likelihood.data.recorded_data import RECORD
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.estimation.likelihood.multistart import fit_multistart
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
 from drivetwin.estimation.likelihood.priors import build_problem
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
+from drivetwin.likelihood.objective import LikelihoodObjective
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.recorded_data import RECORD
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.model_components import Component, Place
 from drivetwin.simulation.driveline import ENGINE, OUTPUT, SHAFT, WHEEL, build_driveline

@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.recorded_data import hold_ends
 from drivetwin.fit.fixed_numbers import FixedNumber, list_fixed, make_plain
 from drivetwin.fit.places import Numbers, list_places
+from drivetwin.likelihood.recorded_data import hold_ends
 from drivetwin.modeling.model import Model
 from drivetwin.modeling.model_components import Component, Place
 from drivetwin.simulation.dual_clutch import Signal

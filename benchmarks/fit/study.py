@@ -24,11 +24,11 @@ from benchmarks.fit.problem import (
 from benchmarks.fit.problems import build_problem
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.likelihood.data.recorded_data import hold_ends
 from drivetwin.fit.fixed_numbers import Source, Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
+from drivetwin.likelihood.recorded_data import hold_ends
 
 CLOSE = 10.0
 """Cost above that of the minimum at the truth up to which a minimum counts as the right one."""

@@ -13,8 +13,8 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.fit import compute_covariance
 from drivetwin.estimation.result.method import Method
+from drivetwin.likelihood.covariance import compute_covariance
 from drivetwin.pipeline import identify
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.bench import NO_EFFECT, read_run

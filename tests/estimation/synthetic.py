@@ -13,13 +13,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivetwin._util.arrays import estimate_rounding_step
-from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
-    MeasuredSignal,
     ShiftElementKinematics,
     ShiftSignals,
 )
+from drivetwin.likelihood.measured_signal import MeasuredSignal, estimate_white_noise
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import PriorValue

@@ -13,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.expression import Expression
 from drivetwin.fit.fit import fit_network
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.formula import parse_formula
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.unknown import Unknown
+from drivetwin.likelihood.point import ParameterVector
 from tests.support.fits import make_small
 
 NAMES = ("x", "K0.friction.mu_c", "level of y")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.estimation.likelihood.noise.residual_covariance import LinearResponse
+from drivetwin.likelihood.residual_covariance import LinearResponse
 from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import NetworkRun, Output, Start, build_element, simulate
 from drivetwin.simulation.network_response import NetworkResponse, compute_response

@@ -17,13 +17,13 @@ from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.scenario import Scenario
 from drivetwin.dyno.truth import Effects
-from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
     ShiftElementKinematics,
     ShiftSignals,
 )
 from drivetwin.estimation.identification import Identification
+from drivetwin.likelihood.measured_signal import prepare_signal
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.shift_kind import ShiftKind

@@ -13,8 +13,8 @@ from drivetwin.findings import Code, make_row, report
 from drivetwin.report.blocks import TableBlock, build_findings_section
 
 ROWS = (
-    make_row(shift="2-3", channel="output torque", source="engine torque", size=7.4),
-    make_row(shift="2-3", channel="output speed", source="pressure of B3", size=-5.6),
+    make_row(recording="2-3", channel="output torque", source="engine torque", size=7.4),
+    make_row(recording="2-3", channel="output speed", source="pressure of B3", size=-5.6),
 )
 FOUND = replace(
     report(

@@ -13,8 +13,8 @@ import tomlkit
 
 from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.cli import main
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.files.twin_file import load_twin
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.tcu.card import load_controller_card
 from drivetwin.tcu.log import read_controller_log
 from drivetwin.tcu.plant import build_term

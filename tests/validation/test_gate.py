@@ -10,9 +10,10 @@ import pytest
 
 from drivetwin.estimation.identification import Identification, StageResults
 from drivetwin.estimation.result.cause import PredictedSpread
-from drivetwin.estimation.result.estimate import SignalFit, Verdict
+from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code, report
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.validation.gate import assess_model
 from drivetwin.vehicle.spec import PriorValue
 from tests.report.sample import TIME, identification, validation

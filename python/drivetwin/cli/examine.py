@@ -22,7 +22,7 @@ from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.experiment_design import compute_rankings
 from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
-from drivetwin.estimation.analysis.profile_likelihood import Profile, compute_profile
+from drivetwin.estimation.analysis.profile_likelihood import compute_profile
 from drivetwin.estimation.data.prepare import collect_tolerances
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.files.result_file import (
@@ -33,6 +33,7 @@ from drivetwin.files.result_file import (
 )
 from drivetwin.fit import examine as of_fit
 from drivetwin.fit.examine import REPEATS, Improvement, rank_improvements
+from drivetwin.likelihood.profile import Profile
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import Block, Cell, Outcome, TableBlock, make_table
 from drivetwin.report.sections.parameters import build_suggestion_blocks, format_half_width

@@ -20,17 +20,14 @@ from drivetwin._util.display_units import format_with_unit
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, IdentifiedActuator
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.actuators import PressureRecord
-from drivetwin.estimation.data.noise import count_repeats
-from drivetwin.estimation.likelihood.data.output import ComparedOutputs, Output
-from drivetwin.estimation.likelihood.noise.residual_covariance import (
-    Whitener,
-    build_sensor_whitener,
-)
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.findings import Code, Finding, report
+from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
+from drivetwin.likelihood.measured_signal import count_repeats
+from drivetwin.likelihood.objective import LikelihoodObjective
+from drivetwin.likelihood.output import ComparedOutputs, Output
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.residual_covariance import Whitener, build_sensor_whitener
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.spec import PriorValue
 

@@ -19,7 +19,6 @@ from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.plain_values import format_json, to_plain_values
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
-from drivetwin.estimation.analysis.profile_likelihood import Profile
 from drivetwin.estimation.identification import Identification, LogPull, LogShare
 from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.estimate import ExperimentRanking, LoadLaw
@@ -39,6 +38,7 @@ from drivetwin.files.records import (
     read_record,
 )
 from drivetwin.fit.examine import REPEATS, Improvement
+from drivetwin.likelihood.profile import Profile
 from drivetwin.shifts.shift import RejectedShift
 from drivetwin.vehicle.shift_kind import ShiftKind
 

@@ -13,17 +13,13 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
-from drivetwin.estimation.likelihood.data.output import ComparedOutputs
-from drivetwin.estimation.likelihood.data.output import Output as ComparedOutput
-from drivetwin.estimation.likelihood.noise.residual_covariance import (
-    LinearResponse,
-    Whitener,
-    build_sensor_whitener,
-)
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.optimize.objective import ParameterVector, place_columns
 from drivetwin.fit.input_path import InputPath
 from drivetwin.fit.plant import Plant
+from drivetwin.likelihood.objective import LikelihoodObjective
+from drivetwin.likelihood.output import ComparedOutputs
+from drivetwin.likelihood.output import Output as ComparedOutput
+from drivetwin.likelihood.point import ParameterVector, place_columns
+from drivetwin.likelihood.residual_covariance import LinearResponse, Whitener, build_sensor_whitener
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.simulation.network_response import compute_response

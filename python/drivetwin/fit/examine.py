@@ -8,12 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.estimation.analysis.profile_likelihood import Profile, trace_profile
-from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
-from drivetwin.estimation.likelihood.fit import compute_covariance, invert_information
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.profile import hold_coordinate
 from drivetwin.fit.result import ModelFit
+from drivetwin.likelihood.covariance import (
+    compute_covariance,
+    invert_information,
+    reduce_information,
+)
+from drivetwin.likelihood.profile import Profile, trace_profile
 
 REPEATS = 4
 """Recordings in place of one that an improvement assumes."""

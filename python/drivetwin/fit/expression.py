@@ -14,8 +14,6 @@ from pydantic.json_schema import SkipJsonSchema
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError, suggest_spelling
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.fit.formula import Formula, parse_formula
 from drivetwin.fit.places import Place
 from drivetwin.fit.unknown import (
@@ -30,6 +28,8 @@ from drivetwin.fit.unknown import (
     require_sound,
     resolve_unknown,
 )
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
 from drivetwin.simulation.variable import Variable
 
 

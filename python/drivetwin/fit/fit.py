@@ -12,12 +12,6 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError, InputError, suggest_spelling
-from drivetwin.estimation.likelihood.data.recorded_data import RecordedData
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.optimize.gauss_newton import minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.estimation.result.estimate import SignalFit
 from drivetwin.fit.expression import ResolvedNumbers, add_rows
 from drivetwin.fit.fixed_numbers import list_fixed, make_plain
 from drivetwin.fit.network_model import NetworkModel
@@ -27,6 +21,12 @@ from drivetwin.fit.recording import Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
 from drivetwin.fit.search import search
 from drivetwin.fit.starts import drop_redundant_speeds, guess_start
+from drivetwin.likelihood.gauss_newton import minimise
+from drivetwin.likelihood.objective import LikelihoodObjective
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.recorded_data import RecordedData
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.simulation.element_schema import (
     GROUND,
     find_element_faults,

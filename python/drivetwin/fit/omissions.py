@@ -20,9 +20,6 @@ from scipy.special import logsumexp
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import Quantity
-from drivetwin.estimation.likelihood.column_products import adjust_unknowns, weigh_amounts
-from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import EXPLAINED
 from drivetwin.fit.fixed_numbers import FixedNumber, Source
 from drivetwin.fit.places import list_places
@@ -30,6 +27,9 @@ from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.quantities import find_input_quantity
 from drivetwin.fit.release import extend
 from drivetwin.fit.unknown import ASCII_UNITS
+from drivetwin.likelihood.column_products import adjust_unknowns, weigh_amounts
+from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import GROUND
 from drivetwin.simulation.network import Element, Output, Start, simulate

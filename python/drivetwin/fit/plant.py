@@ -9,14 +9,14 @@ from functools import cached_property
 from typing import Any
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.output import Channel
-from drivetwin.estimation.likelihood.data.recorded_data import RecordedData
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.term import RecordedPlant, RecordedTerm
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.places import CHANNEL, Numbers, Place
 from drivetwin.fit.unknown import Setting, SoughtNumber
+from drivetwin.likelihood.objective import LikelihoodObjective
+from drivetwin.likelihood.output import Channel
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.recorded_data import RecordedData
+from drivetwin.likelihood.term import RecordedPlant, RecordedTerm
 from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.network import Element, Output, Sine, Start, make_input
 from drivetwin.simulation.network_sensitivity import NetworkTask

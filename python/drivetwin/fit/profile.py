@@ -14,17 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.analysis.profile_likelihood import (
+from drivetwin.estimation.result.estimate import Z95
+from drivetwin.fit.plant import Problem
+from drivetwin.likelihood.covariance import invert_information
+from drivetwin.likelihood.gauss_newton import OptimizeResult
+from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.profile import (
     PROFILE,
     HeldParameter,
     Profile,
     trace_profile,
 )
-from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
-from drivetwin.estimation.regression.errors_in_variables import Prior
-from drivetwin.estimation.result.estimate import Z95
-from drivetwin.fit.plant import Problem
 
 
 @dataclass(frozen=True)

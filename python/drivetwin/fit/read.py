@@ -12,12 +12,12 @@ from drivetwin.channels.mapping_file import read_project_mapping
 from drivetwin.channels.recognition import find_candidates
 from drivetwin.channels.roles import ChannelSpec, Column, ReadOptions
 from drivetwin.errors import MappingError, MissingChannelError, Where
-from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.findings import Finding
 from drivetwin.fit.model_file import ModelChannels
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.recording import Measured, Recording
+from drivetwin.likelihood.measured_signal import prepare_signal
 from drivetwin.logs.formats.detect import open_recording, open_stated
 from drivetwin.logs.read import read_channels
 from drivetwin.simulation.dual_clutch import Signal

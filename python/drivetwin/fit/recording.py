@@ -13,15 +13,11 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, estimate_rounding_step
 from drivetwin.errors import InputError, suggest_spelling
-from drivetwin.estimation.data.noise import estimate_white_noise
-from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.likelihood.data.input_smoothing import (
-    select_windows,
-    smooth_windows,
-)
-from drivetwin.estimation.likelihood.data.output import Output
-from drivetwin.estimation.likelihood.data.recorded_data import RECORD, RecordedData, fill_grid
-from drivetwin.estimation.likelihood.data.sample_noise import Quantization, estimate_quantization
+from drivetwin.likelihood.input_smoothing import select_windows, smooth_windows
+from drivetwin.likelihood.measured_signal import MeasuredSignal, estimate_white_noise
+from drivetwin.likelihood.output import Output
+from drivetwin.likelihood.recorded_data import RECORD, RecordedData, fill_grid
+from drivetwin.likelihood.sample_noise import Quantization, estimate_quantization
 from drivetwin.simulation.dual_clutch import Signal
 
 _MIN_SAMPLES = 20

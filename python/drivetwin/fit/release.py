@@ -15,15 +15,12 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.column_products import adjust_unknowns
-from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.optimize.gauss_newton import (
-    OptimizeResult,
-    minimise,
-)
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.plant import Problem
+from drivetwin.likelihood.column_products import adjust_unknowns
+from drivetwin.likelihood.covariance import invert_information
+from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.vehicle.spec import PriorValue
 
 

@@ -12,18 +12,12 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError, suggest_spelling
-from drivetwin.estimation.likelihood.coloured_noise import split_whitened
-from drivetwin.estimation.likelihood.diagnostics.identifiability import report_null_directions
-from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    check_residuals,
-    check_weighting,
-    find_order,
+from drivetwin.estimation.result.estimate import (
+    Z95,
+    Estimate,
+    EstimatesMixin,
+    Verdict,
 )
-from drivetwin.estimation.likelihood.fit import compute_covariance
-from drivetwin.estimation.likelihood.optimize.search import RefinedStart
-from drivetwin.estimation.optimize.gauss_newton import OptimizeResult
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
-from drivetwin.estimation.result.estimate import Z95, Estimate, EstimatesMixin, SignalFit, Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.prior_conflict import PRIOR
 from drivetwin.estimation.result.verdict import (
@@ -42,6 +36,13 @@ from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.profile import trace_slow, widen
 from drivetwin.fit.search import FoundMinimum
 from drivetwin.fit.unknown import PlacedNumber, SoughtNumber
+from drivetwin.likelihood.coloured_noise import split_whitened
+from drivetwin.likelihood.covariance import compute_covariance, report_null_directions
+from drivetwin.likelihood.gauss_newton import OptimizeResult
+from drivetwin.likelihood.point import NormalEquations, ParameterVector
+from drivetwin.likelihood.residual_tests import check_residuals, check_weighting, find_order
+from drivetwin.likelihood.search import RefinedStart
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.vehicle.spec import PriorValue
 

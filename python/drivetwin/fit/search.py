@@ -12,8 +12,15 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.likelihood.budget import BudgetExceeded, limit_evaluations
-from drivetwin.estimation.likelihood.optimize.search import (
+from drivetwin.fit.fixed_numbers import FixedNumber
+from drivetwin.fit.omissions import ShownOmission, complete_model
+from drivetwin.fit.plant import NetworkTerm, Problem
+from drivetwin.fit.release import release_fixed
+from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.likelihood.budget import BudgetExceeded, limit_evaluations
+from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.search import (
     SEARCH,
     Attempts,
     RefinedStart,
@@ -21,16 +28,6 @@ from drivetwin.estimation.likelihood.optimize.search import (
     is_near,
     refine_draws,
 )
-from drivetwin.estimation.optimize.gauss_newton import (
-    OptimizeResult,
-    minimise,
-)
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.fit.fixed_numbers import FixedNumber
-from drivetwin.fit.omissions import ShownOmission, complete_model
-from drivetwin.fit.plant import NetworkTerm, Problem
-from drivetwin.fit.release import release_fixed
-from drivetwin.fit.unknown import SoughtNumber
 
 
 @dataclass(frozen=True)

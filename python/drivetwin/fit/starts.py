@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.recorded_data import RecordedData
+from drivetwin.likelihood.recorded_data import RecordedData
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Element, Output, Sine, Start
 from drivetwin.simulation.network_sensitivity import differentiate

@@ -17,13 +17,13 @@ from drivetwin._util.plain_values import format_json
 from drivetwin.channels.roles import ChannelSpec, Quantity
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import InputError, SimulationError
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.model_file import ModelChannels, format_model, read_model
 from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.plant import Plant
 from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.recording import Samples
 from drivetwin.fit.unknown import get_factors
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import simulate
 

@@ -28,7 +28,6 @@ from drivetwin.errors import (
 )
 from drivetwin.estimation.direct.friction_law import P0, evaluate_stribeck
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.fit import invert_information
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.likelihood.parametrization import LAW
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
@@ -47,6 +46,7 @@ from drivetwin.fleet.task import (
     TaskSpec,
     make_estimate_row,
 )
+from drivetwin.likelihood.covariance import invert_information
 from drivetwin.logs.formats.detect import NOTHING_STATED, open_recording
 from drivetwin.logs.read import read_log
 from drivetwin.parameters import get_parameter_spec

@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 from drivetwin.channels.roles import make_pressure_role
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError, MissingParameterError, Where
-from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.prepare import collect_pressures
-from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.likelihood.input_smoothing import smooth_adaptive
+from drivetwin.likelihood.measured_signal import MeasuredSignal, prepare_signal
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, ShiftElement

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.twin.twin import Twin
 
 DIFFER = 2.58

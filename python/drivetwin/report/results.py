@@ -14,13 +14,14 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.toml import parse_toml
 from drivetwin.errors import ResultFileError, Where
-from drivetwin.estimation.result.estimate import Estimate, SignalFit
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.files.bus_file import BUS_SCHEMA, TCU_SCHEMA, BusFile, TcuFile
 from drivetwin.files.fit_file import FIT_SCHEMA, FitFile
 from drivetwin.files.records import FitRecord, ParameterRecord, Record, read_record
 from drivetwin.files.result_file import RESULT_SCHEMA, ResultFile
 from drivetwin.files.twin_file import load_twin
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.parameters import ParameterSpec
 from drivetwin.report.blocks import VerdictBlock
 from drivetwin.report.bus import explain_bus, explain_tcu

@@ -10,9 +10,9 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.optimize.gauss_newton import GaussNewtonSettings, OptimizeResult, minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.fit.driven_term import DrivenProblem
+from drivetwin.likelihood.gauss_newton import GaussNewtonSettings, OptimizeResult, minimise
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.log import ControllerShift
 from drivetwin.tcu.problem import (

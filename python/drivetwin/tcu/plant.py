@@ -12,14 +12,14 @@ from scipy.constants import bar
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import HeldSignal
-from drivetwin.estimation.likelihood.data.output import Output as ComparedOutput
-from drivetwin.estimation.likelihood.noise.residual_covariance import build_sensor_whitener
 from drivetwin.fit.driven_term import DrivenTerm, Rows
 from drivetwin.fit.expression import Expression, resolve_numbers
 from drivetwin.fit.input_path import CommandedClutch, InputPath, lag_signal
 from drivetwin.fit.places import list_places
 from drivetwin.fit.plant import Plant
 from drivetwin.fit.unknown import Unknown
+from drivetwin.likelihood.output import Output as ComparedOutput
+from drivetwin.likelihood.residual_covariance import build_sensor_whitener
 from drivetwin.simulation.dual_clutch import Accuracy
 from drivetwin.simulation.network import Element, Output, Start, build_element
 from drivetwin.simulation.variable import exp

@@ -10,11 +10,11 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.units import RPM
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.optimize.gauss_newton import GaussNewtonSettings, minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.driven_term import DrivenProblem
+from drivetwin.likelihood.gauss_newton import GaussNewtonSettings, minimise
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.identify import TcuTwin
 from drivetwin.tcu.log import SPEEDS, ControllerShift

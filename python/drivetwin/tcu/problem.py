@@ -10,11 +10,11 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.units import RPM
-from drivetwin.estimation.data.noise import count_repeats
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.fit.driven_term import DrivenProblem
 from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.likelihood.measured_signal import count_repeats
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.log import SPEEDS, ControllerShift
 from drivetwin.tcu.plant import build_term

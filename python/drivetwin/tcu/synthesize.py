@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.units import RPM
 from drivetwin.errors import IdentificationError, InputError
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.tcu.card import ControllerCard, ControllerCardFile, make_card
 from drivetwin.tcu.log import REFERENCE_OIL, SPEEDS, ControllerShift
 from drivetwin.tcu.plant import build_term

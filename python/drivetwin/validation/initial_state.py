@@ -12,8 +12,8 @@ from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import MissingChannelError, MissingParameterError, Where
 from drivetwin.estimation.data.actuators import compute_pressure_channel
-from drivetwin.estimation.data.noise import estimate_white_noise
 from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.likelihood.measured_signal import estimate_white_noise
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, State, Trajectory
 from drivetwin.twin.twin import Twin

@@ -10,7 +10,7 @@ import pytest
 
 from drivetwin.errors import IdentificationError, InputError
 from drivetwin.estimation.analysis.profile_likelihood import compute_profile
-from drivetwin.estimation.optimize.gauss_newton import minimise
+from drivetwin.likelihood.gauss_newton import minimise
 from tests.estimation.asked import by_the_paper, slowed, stepped
 
 

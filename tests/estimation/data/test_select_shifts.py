@@ -12,8 +12,8 @@ import pytest
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
-from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.select_shifts import select_shifts
+from drivetwin.likelihood.measured_signal import prepare_signal
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard

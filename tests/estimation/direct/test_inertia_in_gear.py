@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.direct.inertia_in_gear import HeldGear, estimate_gear_inertia
 from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from tests.support.arrays import FloatArray
 from tests.support.coverage import assert_covers, vary_draws
 

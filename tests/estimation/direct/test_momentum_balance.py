@@ -10,10 +10,11 @@ import pytest
 
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.segments import MOMENTUM, find_off_going_release
-from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.direct.friction_law import estimate_friction_law, evaluate_stribeck
 from drivetwin.estimation.direct.load_balance import estimate_load
 from drivetwin.estimation.direct.momentum_balance import MomentumFit, estimate_momentum_inertia
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from tests.estimation.synthetic import Run, Truth
 
 SLIPS = np.array([15.0, 30.0, 40.0, 50.0])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.direct.resonance import fit_resonance
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from tests.support.arrays import FloatArray
 
 TIME = np.arange(5.0, 8.0, 0.02)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.direct.ringdown import (
     compute_shaft_parameters,
     estimate_pencil_start,
 )
 from drivetwin.estimation.paper.pipeline import estimate_paper_ringdown
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from tests.support.arrays import FloatArray
 
 TIME = np.arange(0.0, 2.0, 1e-3)

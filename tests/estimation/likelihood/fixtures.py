@@ -9,7 +9,7 @@ import numpy as np
 
 from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.estimation.likelihood.optimize.multistart import fit_multistart
+from drivetwin.estimation.likelihood.multistart import fit_multistart
 from drivetwin.estimation.likelihood.priors import build_problem
 from tests.support.bench import Bench, Knowledge, record_bench
 from tests.support.shared_results import shared

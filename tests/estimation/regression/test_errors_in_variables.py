@@ -11,11 +11,11 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.regression.errors_in_variables import (
     BandedCholesky,
     Fit,
-    Prior,
     Term,
     solve,
 )
 from drivetwin.estimation.regression.modulating_functions import Quadrature
+from drivetwin.likelihood.prior import Prior
 from tests.support.arrays import FloatArray
 from tests.support.coverage import assert_covers, vary_draws
 

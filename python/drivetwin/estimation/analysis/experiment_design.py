@@ -25,23 +25,14 @@ from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.data.output import Output
-from drivetwin.estimation.likelihood.data.recorded_data import RECORD
-from drivetwin.estimation.likelihood.data.torque_record import TORQUE, TorqueRecord
-from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
-from drivetwin.estimation.likelihood.fit import (
-    LikelihoodFit,
-    compute_variance_inflation,
-    invert_information,
-)
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_variance_inflation
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
-from drivetwin.estimation.likelihood.term import RecordedTerm
+from drivetwin.estimation.likelihood.torque_record import TORQUE, TorqueRecord
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_parameters,
     differentiate,
     make_log_id,
 )
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import (
     FIRMER,
     SOFTER,
@@ -56,6 +47,11 @@ from drivetwin.estimation.result.estimate import (
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.verdict import VERDICT, assess, is_limited
 from drivetwin.findings import Code, explain
+from drivetwin.likelihood.covariance import invert_information, reduce_information
+from drivetwin.likelihood.output import Output
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.recorded_data import RECORD
+from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Signal
 

@@ -21,11 +21,10 @@ from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import ShiftElementKinematics, ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.data.torque_record import TorqueRecord, build_record
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.optimize.multistart import fit_local
+from drivetwin.estimation.likelihood.multistart import fit_local
 from drivetwin.estimation.likelihood.parametrization import (
     LAW,
     DualClutchPlant,
@@ -33,12 +32,13 @@ from drivetwin.estimation.likelihood.parametrization import (
     DualClutchTerm,
 )
 from drivetwin.estimation.likelihood.priors import split_spans
-from drivetwin.estimation.likelihood.term import RecordedTerm
+from drivetwin.estimation.likelihood.torque_record import TorqueRecord, build_record
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
-from drivetwin.estimation.optimize.gauss_newton import solve_step
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.likelihood.gauss_newton import solve_step
+from drivetwin.likelihood.point import NormalEquations, ParameterVector
+from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement, Stribeck
 
 KNOTS = 12

@@ -20,18 +20,17 @@ from drivetwin._util.arrays import Span, estimate_rounding_step
 from drivetwin.channels.roles import OIL_PLACES
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError, IdentificationError
-from drivetwin.estimation.data.noise import prepare_signal
 from drivetwin.estimation.data.select_shifts import SHIFT_SELECTION, select_shifts
 from drivetwin.estimation.data.shift_data import (
     DesignData,
     KnownDriveline,
-    MeasuredSignal,
     PreparedLog,
     ShiftData,
     ShiftElementKinematics,
     ShiftSignals,
     TorqueOfSpeeds,
 )
+from drivetwin.likelihood.measured_signal import MeasuredSignal, prepare_signal
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
 from drivetwin.shifts.detect import FoundShifts, refuse_without_shifts

@@ -11,14 +11,9 @@ import numpy as np
 from drivetwin._util.arrays import Span, compute_moving_mean
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import prepare_signal
-from drivetwin.estimation.data.shift_data import (
-    GearData,
-    KnownDriveline,
-    MeasuredSignal,
-    ShiftSignals,
-)
+from drivetwin.estimation.data.shift_data import GearData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.regression.modulating_functions import Windows, build_windows
+from drivetwin.likelihood.measured_signal import MeasuredSignal, prepare_signal
 from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.detect import find_gear_spans
 from drivetwin.shifts.lockup_clutch import CLOSED, LockUp, compute_mean_slip, detect_lock_ups

@@ -25,8 +25,8 @@ from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.progress import notify_progress
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.segments import MOMENTUM, find_segments
-from drivetwin.estimation.data.shift_data import MeasuredSignal, PreparedLog
-from drivetwin.estimation.regression.errors_in_variables import Fit, Prior, Term, solve
+from drivetwin.estimation.data.shift_data import PreparedLog
+from drivetwin.estimation.regression.errors_in_variables import Fit, Term, solve
 from drivetwin.estimation.regression.modulating_functions import (
     Kernels,
     Quadrature,
@@ -35,6 +35,8 @@ from drivetwin.estimation.regression.modulating_functions import (
     build_windows,
     join_windows,
 )
+from drivetwin.likelihood.measured_signal import MeasuredSignal
+from drivetwin.likelihood.prior import Prior
 from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.shift import RejectedShift, Shift
 

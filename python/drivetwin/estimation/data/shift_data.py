@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.channels.roles import RememberedMapping
-from drivetwin.channels.shiftlog import find_pauses
 from drivetwin.findings import Finding
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import LossLaw
@@ -23,40 +22,6 @@ PLAUSIBLE_ETA = PriorValue(0.9, 0.06)
 """Efficiency of a gearbox if no output torque shows it."""
 NO_DRUM = PriorValue(0.0)
 """Inertia of the drum of an element that has none."""
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredSignal:
-    """One signal: `time` (n,) s increasing, `values` (n,) SI, `sigma` white noise of a sample."""
-
-    time: FloatArray
-    values: FloatArray
-    sigma: float = 0.0
-
-    @cached_property
-    def gaps(self) -> tuple[Span, ...]:
-        """Spans [s] between samples across which nothing is interpolated."""
-        return find_pauses(self.time)
-
-    @property
-    def unrecorded(self) -> tuple[Span, ...]:
-        """Spans [s] without samples: the gaps, before the first sample and after the last."""
-        if not self.time.size:
-            return ((-np.inf, np.inf),)
-        first, last = float(self.time[0]), float(self.time[-1])
-        return ((-np.inf, first), *self.gaps, (last, np.inf))
-
-    def interpolate_at_times(self, time: FloatArray) -> FloatArray:
-        """Values at `time` (m,), linear between samples; NaN inside a gap."""
-        values = np.interp(time, self.time, self.values)
-        for start, end in self.gaps:
-            values[(time > start) & (time < end)] = np.nan
-        return values
-
-    def select_span(self, span: Span) -> MeasuredSignal:
-        """The samples inside `span` [s], both ends included."""
-        keep = (self.time >= span[0]) & (self.time <= span[1])
-        return MeasuredSignal(self.time[keep], self.values[keep], self.sigma)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.estimation.data.shift_data import GearData, MeasuredSignal
+from drivetwin.estimation.data.shift_data import GearData
 from drivetwin.estimation.regression.modulating_functions import (
     Windows,
     build_hann_kernels,
@@ -27,6 +27,7 @@ from drivetwin.estimation.regression.modulating_functions import (
     join_windows,
 )
 from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.shifts.coverage import split_at_gaps
 
 

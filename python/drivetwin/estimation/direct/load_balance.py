@@ -20,9 +20,10 @@ from drivetwin.estimation.data.select_shifts import (
     VehicleBalance,
     build_recorded_windows,
 )
-from drivetwin.estimation.data.shift_data import MeasuredSignal, ShiftSignals
-from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.likelihood.measured_signal import MeasuredSignal
+from drivetwin.likelihood.prior import Prior
 
 WINDOW = 0.01
 """Averaging window of speeds and torques [s], that of the paper's procedure."""

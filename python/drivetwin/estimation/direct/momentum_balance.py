@@ -23,7 +23,6 @@ from scipy.sparse import csr_array
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.segments import MOMENTUM, MomentumSettings, Segment, find_segments
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
@@ -33,7 +32,6 @@ from drivetwin.estimation.data.shift_data import (
 )
 from drivetwin.estimation.regression.errors_in_variables import (
     Fit,
-    Prior,
     Term,
     build_whitening,
     compute_regressors,
@@ -46,6 +44,8 @@ from drivetwin.estimation.regression.modulating_functions import (
     join_windows,
 )
 from drivetwin.findings import Code, Number, report
+from drivetwin.likelihood.measured_signal import estimate_quantization_error
+from drivetwin.likelihood.prior import Prior
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue, compute_middle
 

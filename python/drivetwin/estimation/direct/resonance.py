@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import MeasuredSignal
 from drivetwin.estimation.direct.ringdown import RING_DOWN
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.shifts.coverage import split_at_gaps
 from drivetwin.shifts.shift import Shift
 

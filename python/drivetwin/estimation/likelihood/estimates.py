@@ -18,17 +18,6 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.direct.load_balance import AERO, report_different_loads
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
-from drivetwin.estimation.likelihood.diagnostics.identifiability import (
-    find_at_bounds,
-    find_null_directions,
-    is_at_bound,
-)
-from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    check_residuals,
-    check_weighting,
-    find_order,
-)
 from drivetwin.estimation.likelihood.effects.causes import (
     compute_doubt,
     describe_cause,
@@ -41,10 +30,15 @@ from drivetwin.estimation.likelihood.effects.causes import (
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.identifiability import (
+    find_at_bounds,
+    find_null_directions,
+    is_at_bound,
+)
 from drivetwin.estimation.likelihood.motion import simulate_motion
-from drivetwin.estimation.likelihood.noise.residual_covariance import NoisePath
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm, read_map_changes
 from drivetwin.estimation.likelihood.selection.candidates import check_other_law, collect_loads
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_laws,
     compute_parameters,
@@ -65,7 +59,6 @@ from drivetwin.estimation.likelihood.uncertainty.torque_scale import (
     find_scale,
     scale_covariance,
 )
-from drivetwin.estimation.optimize.objective import ParameterVector, find_acting, join_columns
 from drivetwin.estimation.result.cause import EXPLAINED, WRONG_ENTRY, Cause, PredictedSpread
 from drivetwin.estimation.result.estimate import Estimate, LoadLaw, Verdict
 from drivetwin.estimation.result.estimate_set import (
@@ -85,6 +78,9 @@ from drivetwin.estimation.result.verdict import (
     report_gains,
 )
 from drivetwin.findings import Code, Finding, explain, report
+from drivetwin.likelihood.point import ParameterVector, find_acting, join_columns
+from drivetwin.likelihood.residual_covariance import NoisePath
+from drivetwin.likelihood.residual_tests import check_residuals, check_weighting, find_order
 
 
 def predict_spread(

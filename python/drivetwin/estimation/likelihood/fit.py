@@ -5,16 +5,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.budget import limit_evaluations
-from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
+from drivetwin.likelihood.budget import limit_evaluations
+from drivetwin.likelihood.covariance import compute_covariance, invert_information
+from drivetwin.likelihood.point import NormalEquations, ParameterVector
 from drivetwin.vehicle.effects import EffectId
 
 
@@ -67,25 +65,6 @@ class LikelihoodFit:
     def noise_covariance(self) -> FloatArray:
         """Covariance (p, p) of the unknowns from noise and slow errors."""
         return compute_covariance(self.problem, self.normal, self.chi2)
-
-
-def compute_covariance(
-    problem: LikelihoodObjective[Any], normal: NormalEquations, chi2: float
-) -> FloatArray:
-    """Compute the covariance (p, p) at a minimum, widened by residual power beyond sensor noise.
-
-    The whole is widened where `chi2` exceeds 1, and by slow errors where an output shows them, as
-    far as the unknowns hang on that output.
-    """
-    inverse, counted = invert_information(normal.information), max(chi2, 1.0)
-    return counted * inverse + inverse @ compute_long_run_excess(problem, normal, counted) @ inverse
-
-
-def invert_information(matrix: FloatArray) -> FloatArray:
-    """Invert an information matrix (p, p) after scaling to a unit diagonal."""
-    scale = np.sqrt(np.diag(matrix))
-    inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-14, hermitian=True)
-    return np.asarray(inverse / np.outer(scale, scale))
 
 
 def compute_variance_inflation(fit: LikelihoodFit, rows: FloatArray) -> float:

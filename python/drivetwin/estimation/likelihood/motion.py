@@ -10,7 +10,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.simulation.driveline_run import build_trajectory, list_motion_outputs
 from drivetwin.simulation.dual_clutch import Trajectory
 

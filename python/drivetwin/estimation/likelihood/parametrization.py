@@ -28,10 +28,10 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftElementKinematics
 from drivetwin.estimation.direct.load_balance import AERO
-from drivetwin.estimation.likelihood.data.torque_record import TorqueRecord
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
-from drivetwin.estimation.likelihood.term import Disturbance, RecordedPlant, RecordedTerm
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.likelihood.torque_record import TorqueRecord
+from drivetwin.likelihood.objective import LikelihoodObjective
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.term import Disturbance, RecordedPlant, RecordedTerm
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.simulation.added_elements import (
     BACKLASH,

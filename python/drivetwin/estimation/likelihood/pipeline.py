@@ -14,8 +14,8 @@ from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import admit_excluded
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
-from drivetwin.estimation.likelihood.optimize.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.candidates import try_plants
 from drivetwin.estimation.likelihood.selection.plants import build_plant_priors

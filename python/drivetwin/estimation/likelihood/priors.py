@@ -21,20 +21,15 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import InputError
-from drivetwin.estimation.data.noise import estimate_quantization_error
 from drivetwin.estimation.data.segments import MOMENTUM
 from drivetwin.estimation.data.shift_data import (
     KnownDriveline,
-    MeasuredSignal,
     ShiftElementKinematics,
     ShiftSignals,
 )
 from drivetwin.estimation.direct.friction_law import LAW_PRIOR
 from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute_mean_speed
 from drivetwin.estimation.direct.momentum_balance import DELAY
-from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
-from drivetwin.estimation.likelihood.data.recorded_data import RECORD
-from drivetwin.estimation.likelihood.data.torque_record import build_record
 from drivetwin.estimation.likelihood.parametrization import (
     COMMON,
     LAW,
@@ -47,9 +42,13 @@ from drivetwin.estimation.likelihood.parametrization import (
     Tie,
     map_log_names,
 )
-from drivetwin.estimation.likelihood.term import RecordedTerm
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.estimation.likelihood.torque_record import build_record
+from drivetwin.likelihood.input_smoothing import smooth_adaptive
+from drivetwin.likelihood.measured_signal import MeasuredSignal, estimate_quantization_error
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.recorded_data import RECORD
+from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
 from drivetwin.shifts.shift import compute_exclusive_spans
 from drivetwin.simulation.dual_clutch import LossLaw, Signal

@@ -27,22 +27,18 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.direct.friction_law import evaluate_stribeck
 from drivetwin.estimation.identification import Consistency, LogPull
-from drivetwin.estimation.likelihood.diagnostics.identifiability import reduce_information
-from drivetwin.estimation.likelihood.fit import (
-    LikelihoodFit,
-    compute_variance_inflation,
-    invert_information,
-)
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, compute_variance_inflation
 from drivetwin.estimation.likelihood.parametrization import LAW, RUN_SPECIFIC, map_log_names
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import (
     compute_jacobian,
     compute_parameters,
 )
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdict
 from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.estimation.result.verdict import compute_covariance_root, join_reasons
 from drivetwin.findings import Code, explain
+from drivetwin.likelihood.covariance import invert_information, reduce_information
+from drivetwin.likelihood.prior import Prior
 
 
 def apply_consistency(joint: EstimateSet, tested: Consistency) -> EstimateSet:

@@ -37,9 +37,9 @@ from drivetwin.estimation.identify import identify
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import admit_excluded
 from drivetwin.estimation.likelihood.estimates import build_estimates
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.mechanism import Mechanism, disable
-from drivetwin.estimation.likelihood.optimize.multistart import MULTI_START
+from drivetwin.estimation.likelihood.multistart import MULTI_START
 from drivetwin.estimation.likelihood.parametrization import (
     LOG_SPECIFIC,
     RUN_SPECIFIC,
@@ -53,6 +53,7 @@ from drivetwin.estimation.multi_log.consistency import (
 from drivetwin.estimation.result.estimate_set import EstimateSet, collect_shift_findings
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.prior_conflict import check_design_ranges, check_efficiency_limit
+from drivetwin.likelihood.covariance import invert_information
 from drivetwin.parameters import split_log_number
 from drivetwin.vehicle.spec import SensorTolerance
 

@@ -23,8 +23,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftData
 from drivetwin.estimation.direct.load_balance import AERO
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
-from drivetwin.estimation.likelihood.optimize.initial_guess import TYPICAL_LAW
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.initial_guess import TYPICAL_LAW
 from drivetwin.estimation.likelihood.parametrization import (
     LAW,
     LOG_SPECIFIC,
@@ -35,12 +35,13 @@ from drivetwin.estimation.likelihood.parametrization import (
 )
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.sampling_mode import get_modes, select_modes
-from drivetwin.estimation.likelihood.term import RecordedTerm
-from drivetwin.estimation.optimize.gauss_newton import minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
 from drivetwin.estimation.result.validation import PredictionInterval
 from drivetwin.estimation.result.verdict import compute_covariance_root
+from drivetwin.likelihood.covariance import invert_information
+from drivetwin.likelihood.gauss_newton import minimise
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.simulation.dual_clutch import State
 
 

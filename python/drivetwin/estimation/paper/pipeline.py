@@ -18,7 +18,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span, compute_moving_mean
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.data.shift_data import KnownDriveline, MeasuredSignal, ShiftSignals
+from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.direct.load_balance import (
     WINDOW,
     compute_window_edges,
@@ -42,6 +42,7 @@ from drivetwin.estimation.result.verdict import (
     refuse_parameter,
 )
 from drivetwin.findings import Code, Finding, explain, report
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import Stribeck
 

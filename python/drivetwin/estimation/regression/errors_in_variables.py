@@ -24,9 +24,10 @@ from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.optimize.gauss_newton import minimise_with_line_search
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.regression.modulating_functions import Quadrature
+from drivetwin.likelihood.gauss_newton import minimise_with_line_search
+from drivetwin.likelihood.point import NormalEquations, ParameterVector
+from drivetwin.likelihood.prior import Prior
 
 NUGGET = 1e-9
 """Added to S relative to its diagonal: strongly overlapping windows are nearly dependent."""
@@ -45,49 +46,6 @@ class Term:
     quadrature: Quadrature
     factor: FloatArray
     slopes: Mapping[int, tuple[FloatArray, Quadrature]]
-
-
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """Normal prior on θ: `mean` (p,) and `precision` (p, p), zero rows where nothing is known."""
-
-    mean: FloatArray
-    precision: FloatArray
-
-    @classmethod
-    def from_independent(cls, size: int, entries: Mapping[int, tuple[float, float]]) -> Prior:
-        """Independent priors by parameter index: (mean, standard deviation > 0)."""
-        mean, precision = np.zeros(size), np.zeros((size, size))
-        for index, (value, std) in entries.items():
-            mean[index], precision[index, index] = value, std**-2
-        return cls(mean, precision)
-
-    def append(self, value: float, std: float) -> Prior:
-        """Copy the prior with one more parameter, independent of the others."""
-        precision = np.pad(self.precision, (0, 1))
-        precision[-1, -1] = std**-2
-        return Prior(np.append(self.mean, value), precision)
-
-    def fix_parameter(self, index: int, value: float) -> Prior:
-        """Copy the prior with one parameter fixed at `value`."""
-        mean, precision = self.mean.copy(), self.precision.copy()
-        mean[index] = value
-        precision[index, :] = precision[:, index] = 0.0
-        precision[index, index] = 1e18
-        return Prior(mean, precision)
-
-    def linearise(self, theta: FloatArray) -> Prior:
-        """Return the prior with a precision that holds at `theta` (p,): itself, as it is linear."""
-        del theta
-        return self
-
-    def compute_gradient(self, theta: FloatArray) -> FloatArray:
-        """Precision times (θ - θ₀), shape (p,)."""
-        return np.asarray(self.precision @ (theta - self.mean), dtype=float)
-
-    def compute_prior_cost(self, theta: FloatArray) -> float:
-        """(θ - θ₀)ᵀ P⁻¹ (θ - θ₀)."""
-        return float((theta - self.mean) @ self.compute_gradient(theta))
 
 
 @dataclass(frozen=True, eq=False)

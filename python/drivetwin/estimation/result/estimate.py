@@ -336,11 +336,3 @@ class LoadLaw:
         """Convert the law to the parameters of the model."""
         constant = i_f * Tv_over_if - self.aero * self.mean_speed**2
         return RoadLoad(constant=constant, aero=self.aero)
-
-
-@dataclass(frozen=True)
-class SignalFit:
-    """Agreement of simulation and measurement in one phase of one signal (THEORY section 4)."""
-
-    rmse: float
-    fit_percent: float

@@ -8,28 +8,13 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-import numpy as np
-
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.rich_display import DisplayMixin
-from drivetwin.estimation.result.estimate import Estimate, SignalFit
+from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.findings import Finding
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
-
-
-def compute_fit(measured: FloatArray, simulated: FloatArray, mean: FloatArray | float) -> SignalFit:
-    """Rmse and fit % = 100·(1 - ‖y - ŷ‖/‖y - mean‖) (THEORY section 4); arrays (n,), SI.
-
-    `mean` is that of the log, or of each sample's log (n,) where samples of several are pooled.
-    NaN where there are no samples; a constant measurement has no fit %.
-    """
-    if measured.size == 0:
-        return SignalFit(float("nan"), float("nan"))
-    miss = float(np.linalg.norm(measured - simulated))
-    spread = float(np.linalg.norm(measured - mean))
-    percent = 100.0 * (1.0 - miss / spread) if spread > 0.0 else float("nan")
-    return SignalFit(miss / float(np.sqrt(measured.size)), percent)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,14 +12,6 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import Display, format_significant
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.identification import Identification
-from drivetwin.estimation.likelihood.coloured_noise import COLOURED_NOISE, compute_block_means
-from drivetwin.estimation.likelihood.diagnostics.residual_tests import (
-    MAX_EXCESS_POWER,
-    SIGNIFICANT,
-    ResidualTest,
-    compute_white_residuals,
-    run_residual_tests,
-)
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     DELAY,
@@ -29,6 +21,14 @@ from drivetwin.estimation.likelihood.uncertainty.sensor_tolerance import (
     compute_sensitivity,
 )
 from drivetwin.estimation.result.estimate import Z95
+from drivetwin.likelihood.coloured_noise import COLOURED_NOISE, compute_block_means
+from drivetwin.likelihood.residual_tests import (
+    MAX_EXCESS_POWER,
+    SIGNIFICANT,
+    ResidualTest,
+    compute_white_residuals,
+    run_residual_tests,
+)
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import (
     Block,

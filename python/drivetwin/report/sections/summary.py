@@ -25,9 +25,10 @@ from drivetwin.actuator.model import (
 )
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification
-from drivetwin.estimation.result.estimate import Z95, FrictionCurve, SignalFit
+from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.findings import render
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.report.blocks import (
     Block,
     Cell,

@@ -12,7 +12,7 @@ import pytest
 from drivetwin.estimation.likelihood.effects import correction
 from drivetwin.estimation.likelihood.effects.columns import EffectColumns, EffectPriors
 from drivetwin.estimation.likelihood.effects.correction import _Amounts, _Answer, _extrapolate
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.likelihood.point import ParameterVector
 
 
 @pytest.mark.parametrize("slow", [1, 2, 3])

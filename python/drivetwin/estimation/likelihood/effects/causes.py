@@ -15,12 +15,12 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.estimation.likelihood.diagnostics.identifiability import locate_bounds
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS, describe_group
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
+from drivetwin.estimation.likelihood.identifiability import locate_bounds
 from drivetwin.estimation.result.cause import EXPLAINED, LEAD, Cause, Group
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report

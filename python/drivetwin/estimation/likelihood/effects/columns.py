@@ -14,7 +14,6 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import get_pressure_element
 from drivetwin.estimation.data.shift_data import KnownDriveline
-from drivetwin.estimation.likelihood.data.torque_record import TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     OperatingPoint,
@@ -22,13 +21,14 @@ from drivetwin.estimation.likelihood.effects.effect import (
 )
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
-from drivetwin.estimation.optimize.objective import (
+from drivetwin.estimation.likelihood.torque_record import TORQUE, get_columns
+from drivetwin.estimation.result.cause import Group
+from drivetwin.likelihood.point import (
     ParameterVector,
     place_columns,
     scale_columns,
     select_columns,
 )
-from drivetwin.estimation.result.cause import Group
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import SensorTolerance

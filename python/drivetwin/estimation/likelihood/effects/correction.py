@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.budget import limit_evaluations
 from drivetwin.estimation.likelihood.effects.columns import (
     EffectColumns,
     EffectPriors,
@@ -25,15 +24,12 @@ from drivetwin.estimation.likelihood.effects.joint_step import (
     take_joint_step,
     weight_columns,
 )
-from drivetwin.estimation.likelihood.fit import (
-    LikelihoodFit,
-    PlantEvidence,
-    compute_covariance,
-    invert_information,
-)
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
 from drivetwin.estimation.result.cause import Group
+from drivetwin.likelihood.budget import limit_evaluations
+from drivetwin.likelihood.covariance import compute_covariance, invert_information
+from drivetwin.likelihood.point import NormalEquations, ParameterVector
 
 
 @dataclass(frozen=True)

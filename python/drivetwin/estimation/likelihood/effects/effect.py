@@ -17,12 +17,12 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.torque_record import TorqueRecord, get_columns
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
 from drivetwin.estimation.likelihood.motion import Contact, evaluate_contact, simulate_motion
-from drivetwin.estimation.likelihood.noise.residual_covariance import LinearResponse
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.likelihood.torque_record import TorqueRecord, get_columns
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.residual_covariance import LinearResponse
 from drivetwin.simulation.added_elements import AddedElements
 from drivetwin.simulation.driveline import INPUT, OUTPUT, WHEEL
 from drivetwin.simulation.driveline_run import COMPARED

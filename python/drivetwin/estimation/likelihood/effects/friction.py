@@ -16,7 +16,7 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
 )
 from drivetwin.estimation.likelihood.motion import Contact
 from drivetwin.estimation.likelihood.parametrization import LAW
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.simulation.dual_clutch import FrictionTable
 from drivetwin.vehicle.effects import EffectId
 

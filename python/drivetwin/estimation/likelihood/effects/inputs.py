@@ -8,9 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, apply_lag
-from drivetwin.estimation.data.shift_data import MeasuredSignal
-from drivetwin.estimation.likelihood.data.input_smoothing import smooth_adaptive
-from drivetwin.estimation.likelihood.data.torque_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     Effect,
@@ -20,6 +17,9 @@ from drivetwin.estimation.likelihood.effects.effect import (
     draw_walk,
 )
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.estimation.likelihood.torque_record import TORQUE
+from drivetwin.likelihood.input_smoothing import smooth_adaptive
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId
 

@@ -20,23 +20,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.coloured_noise import compute_long_run_excess
-from drivetwin.estimation.likelihood.column_products import (
+from drivetwin.estimation.likelihood.effects.columns import EffectColumns
+from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
+from drivetwin.estimation.result.cause import Group
+from drivetwin.likelihood.coloured_noise import compute_long_run_excess
+from drivetwin.likelihood.column_products import (
     AdjustedColumns,
     adjust_unknowns,
     compute_column_products,
     weigh_amounts,
 )
-from drivetwin.estimation.likelihood.effects.columns import EffectColumns
-from drivetwin.estimation.likelihood.fit import invert_information
-from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
-from drivetwin.estimation.optimize.objective import (
+from drivetwin.likelihood.covariance import invert_information
+from drivetwin.likelihood.point import (
     NormalEquations,
     join_columns,
     scale_columns,
     select_columns,
 )
-from drivetwin.estimation.result.cause import Group
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import integrate_trapezoids
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE, get_columns
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     Effect,
@@ -21,6 +20,7 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     SyntheticVehicle,
     filter_torque,
 )
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE, get_columns
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     Effect,
@@ -16,6 +15,7 @@ from drivetwin.estimation.likelihood.effects.effect import (
     compute_middle,
 )
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE
 from drivetwin.simulation.added_elements import InputShaft, ShaftTable, TyreSlip, compute_gap
 from drivetwin.simulation.driveline import OUTPUT, WHEEL
 from drivetwin.vehicle.effects import EffectId

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from drivetwin.estimation.direct.load_balance import AERO
-from drivetwin.estimation.likelihood.data.torque_record import TORQUE
 from drivetwin.estimation.likelihood.effects.effect import (
     Disturbance,
     Effect,
@@ -19,6 +18,7 @@ from drivetwin.estimation.likelihood.effects.effect import (
     draw_walk,
 )
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticVehicle
+from drivetwin.estimation.likelihood.torque_record import TORQUE
 from drivetwin.simulation.driveline import INPUT, OUTPUT, WHEEL
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.effects import EffectId

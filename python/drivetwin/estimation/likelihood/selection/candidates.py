@@ -28,7 +28,6 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
 from drivetwin._util.progress import TimedStages
 from drivetwin.estimation.direct.load_balance import AERO, LOAD_BALANCE, compute_term_evidence
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
@@ -41,11 +40,12 @@ from drivetwin.estimation.likelihood.selection.plants import (
     list_starts,
     refit_plant,
 )
-from drivetwin.estimation.optimize.gauss_newton import solve_step
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.result.cause import LEAD, SHOWN, Group
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report
+from drivetwin.likelihood.gauss_newton import solve_step
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.effects import EffectId, EffectPrior

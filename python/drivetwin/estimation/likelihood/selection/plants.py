@@ -22,16 +22,17 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.data.shift_data import KnownDriveline
-from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.joint_step import SIZES
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence, compute_covariance
-from drivetwin.estimation.likelihood.objective import LikelihoodObjective
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
 from drivetwin.estimation.likelihood.parametrization import PLANTS, DualClutchProblem, PlantEffect
-from drivetwin.estimation.optimize.gauss_newton import OptimizeResult, minimise
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
-from drivetwin.estimation.regression.errors_in_variables import Prior
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE
+from drivetwin.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
+from drivetwin.likelihood.covariance import compute_covariance
+from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
+from drivetwin.likelihood.objective import LikelihoodObjective
+from drivetwin.likelihood.point import NormalEquations, ParameterVector
+from drivetwin.likelihood.prior import Prior
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
 

@@ -30,29 +30,21 @@ from itertools import product
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.budget import BudgetExceeded
-from drivetwin.estimation.likelihood.coloured_noise import compute_block_means, split_whitened
-from drivetwin.estimation.likelihood.column_products import compute_column_products
-from drivetwin.estimation.likelihood.data.torque_record import (
-    OUTPUT_TORQUE,
-    OUTPUTS,
-    TORQUE,
-)
 from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
-from drivetwin.estimation.likelihood.optimize.multistart import (
-    MULTI_START,
-    find_near_point,
-    fit_local,
-)
-from drivetwin.estimation.likelihood.optimize.search import SEARCH
+from drivetwin.estimation.likelihood.multistart import MULTI_START, find_near_point, fit_local
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem, DualClutchTerm
-from drivetwin.estimation.likelihood.term import RecordedTerm
-from drivetwin.estimation.optimize.gauss_newton import solve_step
-from drivetwin.estimation.optimize.objective import NormalEquations, ParameterVector
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE, OUTPUTS, TORQUE
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report
+from drivetwin.likelihood.budget import BudgetExceeded
+from drivetwin.likelihood.coloured_noise import compute_block_means, split_whitened
+from drivetwin.likelihood.column_products import compute_column_products
+from drivetwin.likelihood.gauss_newton import solve_step
+from drivetwin.likelihood.point import NormalEquations, ParameterVector
+from drivetwin.likelihood.search import SEARCH
+from drivetwin.likelihood.term import RecordedTerm
 
 SIGNALS = (*OUTPUTS, TORQUE)
 SPEEDS = tuple(name for name in OUTPUTS if name.endswith("speed"))

@@ -19,19 +19,13 @@ from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.direct.load_balance import AERO
-from drivetwin.estimation.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
-from drivetwin.estimation.likelihood.diagnostics.identifiability import locate_bounds
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.shaft import ROUNDING
-from drivetwin.estimation.likelihood.fit import (
-    LikelihoodFit,
-    PlantEvidence,
-    compute_covariance,
-)
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
+from drivetwin.estimation.likelihood.identifiability import locate_bounds
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
-from drivetwin.estimation.likelihood.optimize.multistart import (
+from drivetwin.estimation.likelihood.multistart import (
     MULTI_START,
     NoConvergence,
     compute_spread,
@@ -41,7 +35,6 @@ from drivetwin.estimation.likelihood.optimize.multistart import (
     refine,
     scan_shaft,
 )
-from drivetwin.estimation.likelihood.optimize.search import find_best_draw
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.estimation.likelihood.priors import build_problem
 from drivetwin.estimation.likelihood.selection.candidates import (
@@ -65,10 +58,14 @@ from drivetwin.estimation.likelihood.selection.sampling_mode import (
     select_sampling_mode,
     widen_over_modes,
 )
-from drivetwin.estimation.optimize.gauss_newton import minimise
-from drivetwin.estimation.optimize.objective import ParameterVector
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.result.estimate_set import report_growth
 from drivetwin.findings import Finding
+from drivetwin.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
+from drivetwin.likelihood.covariance import compute_covariance
+from drivetwin.likelihood.gauss_newton import minimise
+from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.search import find_best_draw
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue

@@ -29,9 +29,9 @@ from drivetwin.estimation.likelihood.parametrization import (
     DualClutchPlant,
     DualClutchProblem,
 )
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.estimate import CardNumber, CardNumberKind
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_law_id
 from drivetwin.simulation.dual_clutch import compute_series_inertia
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray, propagate_variance
 from drivetwin.estimation.direct.friction_law import build_law_derivatives, evaluate_stribeck
-from drivetwin.estimation.likelihood.data.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.friction import FrictionShapes, has_free_law
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.motion import find_loaded_slips
 from drivetwin.estimation.likelihood.parametrization import LAW
+from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import differentiate
 from drivetwin.estimation.result.cause import SHOWN, Group
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict

@@ -17,10 +17,11 @@ from drivetwin.channels.roles import make_pressure_role
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.estimation.likelihood.effects.columns import build_sensor_columns, observe
 from drivetwin.estimation.likelihood.effects.effect import evaluate_operating_point
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, invert_information
+from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.uncertainty.derived_parameters import compute_parameters
-from drivetwin.estimation.optimize.objective import ParameterVector
 from drivetwin.estimation.result.estimate import FrictionCurve
+from drivetwin.likelihood.covariance import invert_information
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.vehicle.spec import SensorTolerance
 
 SIZE = 0.01

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Shift records of the likelihood: samples, input smoothing, quantisation."""

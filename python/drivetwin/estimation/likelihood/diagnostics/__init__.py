@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Misspecification tests, residual tests, identifiability."""

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Initial guesses, staged starts and multi-start of the likelihood fit."""

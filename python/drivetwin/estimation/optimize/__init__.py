@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Least-squares optimisers over an `Objective`, without knowledge of the driveline."""
