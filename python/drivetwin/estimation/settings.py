@@ -7,18 +7,24 @@ from dataclasses import asdict
 from typing import Any
 
 from drivetwin.estimation import identification
-from drivetwin.estimation.data import noise, segments, select_shifts
+from drivetwin.estimation.data import segments, select_shifts
 from drivetwin.estimation.direct import load_balance, momentum_balance
-from drivetwin.estimation.likelihood import coloured_noise, objective, priors
-from drivetwin.estimation.likelihood.data import input_smoothing, recorded_data
+from drivetwin.estimation.likelihood import initial_guess, multistart, priors
 from drivetwin.estimation.likelihood.effects import causes, correction, joint_step
-from drivetwin.estimation.likelihood.noise import residual_covariance
-from drivetwin.estimation.likelihood.optimize import initial_guess, multistart, search
-from drivetwin.estimation.optimize import gauss_newton
 from drivetwin.estimation.result import prior_conflict, verdict
+from drivetwin.likelihood import (
+    coloured_noise,
+    gauss_newton,
+    input_smoothing,
+    measured_signal,
+    objective,
+    recorded_data,
+    residual_covariance,
+    search,
+)
 
 _STAGES = (
-    *(noise, select_shifts, segments, momentum_balance, load_balance, initial_guess),
+    *(measured_signal, select_shifts, segments, momentum_balance, load_balance, initial_guess),
     *(recorded_data, input_smoothing, priors, multistart, search, gauss_newton, objective),
     *(residual_covariance, coloured_noise, causes, joint_step, correction),
     *(verdict, prior_conflict, identification),
