@@ -19,7 +19,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, IdentifiedActuator
 from drivetwin.channels.units import BAR
-from drivetwin.dyno.actuators import ControlledActuator, Program
+from drivetwin.dyno.scenario import ControlledActuator, Program
 from drivetwin.estimation.actuators import identify_actuator
 from drivetwin.estimation.data.actuators import PressureRecord
 from drivetwin.estimation.result.estimate import Z95

@@ -21,9 +21,8 @@ import numpy as np
 
 import drivetwin
 from drivetwin.cli.synth import write_run
-from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenario import Program, Scenario
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import Outcome

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from drivetwin import Model
-from drivetwin.modeling.element_help import Plates
+from drivetwin.modeling.model_components import Plates
 from drivetwin.simulation.dual_clutch import FrictionTable, Signal
 from drivetwin.simulation.network import Output
 

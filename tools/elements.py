@@ -12,7 +12,7 @@ from dataclasses import fields as list_fields
 from pathlib import Path
 from textwrap import fill
 
-from drivetwin.modeling.element_help import FIELD_OF, Plates
+from drivetwin.modeling.model_components import FIELD_OF, Plates
 from drivetwin.simulation.element_schema import ELEMENT_TYPES, ElementType, Field, FieldKind
 from tools.elements_page import fill_page
 
@@ -30,8 +30,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drivetwin.modeling.element_help import Plates, document_methods
-from drivetwin.modeling.model_components import Component, ModelComponents, Place
+from drivetwin.modeling.model_components import (
+    Component,
+    ModelComponents,
+    Place,
+    Plates,
+    document_methods,
+)
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.network import InputValue
 

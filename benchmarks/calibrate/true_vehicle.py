@@ -37,9 +37,8 @@ from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.twin_task import Request
 from drivetwin.channels.roles import Quantity, make_command_role
 from drivetwin.channels.units import BAR
-from drivetwin.dyno.actuators import ControlledActuator, Program
 from drivetwin.dyno.dyno import DynoRun, apply_effects, run
-from drivetwin.dyno.scenario import Scenario, Sensor
+from drivetwin.dyno.scenario import ControlledActuator, Program, Scenario, Sensor
 from drivetwin.dyno.scenario_file import convert_channels
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (
     NominalRun,

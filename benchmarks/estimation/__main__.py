@@ -20,7 +20,7 @@ from benchmarks.estimation.starts import count_outcomes
 from benchmarks.estimation.study import run_study
 from benchmarks.estimation.unseen import identify_unseen
 from drivetwin._util.atomic import write_text
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from tests.support.bench import Knowledge
 

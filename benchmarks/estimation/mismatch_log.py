@@ -14,9 +14,8 @@ from types import MappingProxyType
 from benchmarks.estimation.vehicles import SHIFT, add_tolerances, draw_vehicle, misread
 from drivetwin.channels.roles import Quantity, get_pressure_element
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.scenario import Scenario, Sensor
+from drivetwin.dyno.scenario import Program, Scenario, Sensor
 from drivetwin.dyno.scenario_file import convert_channels
 from drivetwin.logs.read import read_log
 from drivetwin.logs.write import write_log

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 
 from benchmarks.estimation.study import build_guess, read_fit
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors

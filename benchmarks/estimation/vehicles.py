@@ -16,9 +16,8 @@ import tomlkit
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.channels.units import BAR
-from drivetwin.dyno.actuators import Actuator, Program, Vibration
 from drivetwin.dyno.dyno import DynoRun
-from drivetwin.dyno.scenario import HeldGear, Scenario, Sensor
+from drivetwin.dyno.scenario import Actuator, HeldGear, Program, Scenario, Sensor, Vibration
 from drivetwin.dyno.scenario_file import format_card
 from drivetwin.simulation.dual_clutch import DualClutch, RoadLoad, ShiftElement, Stribeck
 

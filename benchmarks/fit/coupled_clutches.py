@@ -20,8 +20,8 @@ from drivetwin.errors import InputError
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
-from drivetwin.modeling.element_help import Plates
 from drivetwin.modeling.model import Model
+from drivetwin.modeling.model_components import Plates
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.estimation.study import SLIPS, compute_guess, propagate
 from benchmarks.fit.report import format_header, format_row
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.multistart import fit_multistart
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm

@@ -15,8 +15,8 @@ from benchmarks.fit.problem import (
     make_grid,
     set_start,
 )
-from drivetwin.modeling.element_help import Plates
 from drivetwin.modeling.model import Model
+from drivetwin.modeling.model_components import Plates
 from drivetwin.simulation.dual_clutch import Signal, Stribeck
 
 RATIO_2, FINAL = 2.143, 4.0

@@ -27,7 +27,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from drivetwin._util.rich_display import register_presenter
+from drivetwin._util.display_units import register_presenter
 
 if TYPE_CHECKING:
     from drivetwin.errors import DrivetwinError
@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from drivetwin.fit.unknown import Unknown
     from drivetwin.logs.arrays import read_arrays
     from drivetwin.logs.read import read_log
-    from drivetwin.modeling.element_help import Plates
     from drivetwin.modeling.model import Model
+    from drivetwin.modeling.model_components import Plates
     from drivetwin.pipeline import identify
     from drivetwin.report.html import save_report
     from drivetwin.shifts.detect import detect_shifts
@@ -61,7 +61,7 @@ _HOME = {
     "Measured": ("fit.recording", "Measured"),
     "Method": ("estimation.result.method", "Method"),
     "Model": ("modeling.model", "Model"),
-    "Plates": ("modeling.element_help", "Plates"),
+    "Plates": ("modeling.model_components", "Plates"),
     "Recording": ("fit.recording", "Recording"),
     "Signal": ("simulation.dual_clutch", "Signal"),
     "Twin": ("twin.twin", "Twin"),

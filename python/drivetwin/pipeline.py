@@ -24,8 +24,7 @@ from drivetwin.estimation.identify import identify as identify_prepared
 from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
-from drivetwin.shifts.coverage import find_causes
-from drivetwin.shifts.detect import FoundShifts
+from drivetwin.shifts.detect import FoundShifts, find_causes
 from drivetwin.vehicle.locks import apply_locks, collect_locks
 from drivetwin.vehicle.vehicle_card import VehicleCard
 

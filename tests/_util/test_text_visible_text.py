@@ -9,10 +9,7 @@ import unicodedata
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivetwin._util.text import (
-    escape_json,
-    escape_line,
-)
+from drivetwin._util.text import escape_json, escape_line
 
 ANY = st.text(st.characters(exclude_categories=()))
 

@@ -27,7 +27,7 @@ from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, build_network_elements, load_gearbox, solve_gear
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output, Start, build_element, simulate
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 CAR = load_powertrain("car-350nm")
 NAMES = ("manual-6", "dual-clutch-7")

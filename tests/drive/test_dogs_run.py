@@ -27,7 +27,7 @@ from drivetwin.errors import InputError, SimulationError
 from drivetwin.gearbox import Gearbox, load_gearbox, solve_gear
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 from tests.drive.bus import REFERENCE, candump
 from tests.shifts.fixtures import make_card
 from tests.support.repeats import mark_repeats

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from tests.support.bench import identify_run

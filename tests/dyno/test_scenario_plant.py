@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import build_plant
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import ReductionError

@@ -20,8 +20,7 @@ from drivetwin.estimation.data.shift_data import (
 )
 from drivetwin.likelihood.measured_signal import MeasuredSignal, estimate_white_noise
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 from tests.support.arrays import FloatArray
 
 Input = Callable[[float], float]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 
-from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.arrays import to_plain_values
 from drivetwin.estimation.settings import collect_settings
 
 

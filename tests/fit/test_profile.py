@@ -9,8 +9,8 @@ import pytest
 from drivetwin.fit.fixed_numbers import Tolerance
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.unknown import Unknown
-from drivetwin.modeling.element_help import Plates
 from drivetwin.modeling.model import Model
+from drivetwin.modeling.model_components import Plates
 from drivetwin.simulation.dual_clutch import Signal, Stribeck
 
 TIME = np.linspace(0.0, 2.0, 2001)

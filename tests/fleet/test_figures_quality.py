@@ -9,7 +9,7 @@ import numpy as np
 
 from drivetwin.cli import main
 from drivetwin.fleet.figures import compare_units
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 from tests.fleet.toys import fill, open_store
 
 _UP = ShiftKind.POWER_ON_UP

@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import convert_channels, format_card, load_scenario
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.motion import simulate_motion
 from drivetwin.simulation.dual_clutch import Signal

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivetwin.channels.units import RPM
 from drivetwin.errors import InputError
-from drivetwin.modeling.element_help import Plates
 from drivetwin.modeling.model import Model
-from drivetwin.modeling.units import RPM
+from drivetwin.modeling.model_components import Plates
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS
 from drivetwin.simulation.network import Sine

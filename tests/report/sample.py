@@ -21,8 +21,7 @@ from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_fit, clip_phases
 from drivetwin.vehicle.card import ElementSpec, Gear
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.arrays import FloatArray
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.shifts.breakaway_lockup import (
     locate_pressure_onset,

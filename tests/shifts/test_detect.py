@@ -17,7 +17,7 @@ from drivetwin.errors import TimeError
 from drivetwin.findings import Code, Number, render
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift, ShiftSettings
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 from tests.shifts.fixtures import P0_MADE, Plan, make_card, make_log
 
 _UP = Plan(gears=(("2", 1.91), ("3", 1.43)), break_aways=(1.5,))

@@ -13,7 +13,7 @@ from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.lockup_clutch import detect_lock_ups
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import ROOT, shared
 

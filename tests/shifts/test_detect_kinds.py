@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.bench import read_run
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from drivetwin.shifts.detect import detect_shifts
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import load_measured, load_reference, make_card
 

@@ -16,8 +16,7 @@ from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 from tests.shifts.fixtures import load_reference, make_card, make_log, shared
 
 _CARD = make_card({"2": 2.0, "3": 1.5})

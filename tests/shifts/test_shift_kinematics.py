@@ -9,7 +9,7 @@ import pytest
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.shifts.shift import Shift, get_shift_pressures
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 TIME = np.linspace(0.0, 4.0, 401)
 PRESSURE = np.interp(TIME, [1.9, 2.1, 2.5, 2.8], [1e6, 0.0, 0.0, 8e5])

@@ -11,7 +11,7 @@ from drivetwin.shifts.shift import (
     compute_exclusive_spans,
     split_shared_gears,
 )
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 
 def shift(start: float, lockup: float, gears: tuple[float, float]) -> Shift:

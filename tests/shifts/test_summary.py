@@ -13,7 +13,7 @@ from drivetwin.shifts.summary import (
     compare_drives,
     summarize_shifts,
 )
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 _SHIFT = Shift(
     start_gear="2",

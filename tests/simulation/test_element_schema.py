@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import DrivetwinError, InputError
-from drivetwin.modeling.element_help import Plates
 from drivetwin.modeling.model import Model
+from drivetwin.modeling.model_components import Plates
 from drivetwin.simulation.dual_clutch import Accuracy, Signal, Stribeck
 from drivetwin.simulation.element_schema import ELEMENT_FIELDS, list_ports
 from drivetwin.simulation.network import NetworkRun, Output, Start, simulate

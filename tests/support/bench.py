@@ -26,8 +26,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.likelihood.measured_signal import prepare_signal
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.effects import EffectId, EffectPrior
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 NO_EFFECT = {effect: EffectPrior(0.0) for effect in EffectId}

@@ -20,8 +20,7 @@ from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.synthesize import ModelName, SynthesizedLog, read_builtin, synthesize_log
 from drivetwin.fit.unknown import Unknown
-from drivetwin.modeling.model import Model
-from drivetwin.modeling.run import ModelRun
+from drivetwin.modeling.model import Model, ModelRun
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output
 from tests.support.arrays import FloatArray

@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.dyno.actuators import Program
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenario import Program, Scenario
 from drivetwin.dyno.scenario_file import format_card, format_log, load_scenario
 from drivetwin.simulation.dual_clutch import Stribeck
 

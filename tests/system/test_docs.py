@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.parameters import SPECS
 from drivetwin.vehicle.card import load_card

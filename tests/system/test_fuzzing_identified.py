@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.errors import DrivetwinError
 from drivetwin.findings import render
 from tests.fuzz.identified import Base, base, identified, parted, reports_damage, written

@@ -15,8 +15,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from drivetwin.errors import InputError
-from drivetwin.modeling.element_help import Plates
 from drivetwin.modeling.model import Model
+from drivetwin.modeling.model_components import Plates
 from drivetwin.simulation.network import Output, Sine
 from tests.support.arrays import FloatArray
 

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import drivetwin
-from drivetwin.dyno import dyno
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName, dyno
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import FrictionCurve, Verdict

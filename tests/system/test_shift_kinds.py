@@ -12,8 +12,8 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.cli.synth import write_run
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import DynoRun, run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.dual_clutch import FrictionTable, Stribeck
 from tests.support.coverage import compute_bounds

@@ -24,7 +24,7 @@ from drivetwin.validation.simulate_log import (
     attach_validation,
     simulate_shift,
 )
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 from tests.report.sample import identification
 from tests.support.arrays import FloatArray
 

@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import json
+import math
 import weakref
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from enum import Enum
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -255,3 +259,32 @@ def _filter(values: FloatArray, moving: FloatArray, recursive: FloatArray) -> Fl
     driven = np.convolve(change, moving)[: change.size]
     bands = np.repeat(recursive[:, None], change.size, axis=1)
     return np.asarray(values[0] + solve_banded((recursive.size - 1, 0), bands, driven))
+
+
+def convert_nonfinite(value: object) -> object:
+    """Turn NaN and infinities into None: neither exists in JSON."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def to_plain_values(value: Any) -> Any:
+    """Reduce values to JSON and TOML types: enums to values, arrays to lists, NaN to None, and
+    dataclasses to their fields by name."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = {one.name: getattr(value, one.name) for one in fields(value)}
+    if isinstance(value, Enum):
+        return to_plain_values(value.value)
+    if isinstance(value, np.ndarray | np.generic):
+        return to_plain_values(value.tolist())
+    if isinstance(value, dict):
+        return {str(key): to_plain_values(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [to_plain_values(item) for item in value]
+    if isinstance(value, bool | int | str | None):
+        return value
+    return convert_nonfinite(value) if isinstance(value, float) else str(value)
+
+
+def format_json(value: Any) -> str:
+    """Write a value as strict JSON text: no NaN, plain types, readable."""
+    text = json.dumps(to_plain_values(value), allow_nan=False, ensure_ascii=False, indent=2)
+    return text + "\n"

@@ -26,12 +26,12 @@ from drivetwin.shifts.breakaway_lockup import locate_torque_dip, smooth_channel
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.card_fields import get_card_field
-from drivetwin.vehicle.shift_kind import ShiftKind
 from drivetwin.vehicle.spec import (
     ElementKind,
     ElementSpec,
     Gear,
     PriorValue,
+    ShiftKind,
     describe_assumed_gain,
     describe_fill_pressure,
     describe_inertia,

@@ -48,7 +48,7 @@ from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.estimation.result.verdict import VERDICT
 from drivetwin.findings import Code, Finding, Number, explain, report
-from drivetwin.shifts.coverage import report_unknown_ratios
+from drivetwin.shifts.detect import report_unknown_ratios
 from drivetwin.shifts.shift import (
     RESTS,
     HeldRatio,

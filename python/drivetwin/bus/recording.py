@@ -13,7 +13,7 @@ from drivetwin._util.arrays import FloatArray, Span, estimate_rounding_step
 from drivetwin.channels.roles import FOR_SHIFTS
 from drivetwin.channels.shiftlog import Channel, ShiftLog, find_pauses
 from drivetwin.errors import MissingChannelError, Where
-from drivetwin.shifts.coverage import split_at_gaps
+from drivetwin.shifts.detect import split_at_gaps
 from drivetwin.shifts.lockup_clutch import find_flag_spans
 
 SPEEDS = ("input_speed", "output_speed", "engine_speed")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivetwin._util.arrays import compute_median_step, remember_for_arrays
-from drivetwin._util.rich_display import DisplayMixin
+from drivetwin._util.display_units import DisplayMixin
 from drivetwin.channels.filling import Filling
 from drivetwin.channels.roles import (
     Quantity,

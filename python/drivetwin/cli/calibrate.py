@@ -15,9 +15,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from drivetwin._util.arrays import format_json
 from drivetwin._util.atomic import compute_digest, write_text
 from drivetwin._util.optional_dependencies import get_program_version
-from drivetwin._util.plain_values import format_json
 from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration, Task
 from drivetwin.calibration.calibrate import calibrate as run_calibration

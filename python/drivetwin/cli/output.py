@@ -196,7 +196,7 @@ def print_blocks(blocks: Iterable[Block]) -> None:
 
 def print_json(value: Mapping[str, Any]) -> None:
     """Print one strict JSON document on stdout; NaN and infinities become null."""
-    from drivetwin._util.plain_values import format_json
+    from drivetwin._util.arrays import format_json
 
     sys.stdout.write(escape_json(format_json(dict(value))))
 

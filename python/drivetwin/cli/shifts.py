@@ -42,8 +42,7 @@ from drivetwin.report.whole_drive import (
     build_summary_tables,
     build_whole_drive_page,
 )
-from drivetwin.shifts.coverage import find_causes
-from drivetwin.shifts.detect import FoundShifts, detect_shifts, find_gear_spans
+from drivetwin.shifts.detect import FoundShifts, detect_shifts, find_causes, find_gear_spans
 from drivetwin.shifts.lockup_clutch import LockUp, detect_lock_ups
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.shifts.summary import (

@@ -14,9 +14,9 @@ from drivetwin.cli.identify import run_identification, write_outcome
 from drivetwin.cli.options import REPORT
 from drivetwin.cli.output import show_step, write_atomically, write_texts
 from drivetwin.cli.requests.identification import Demonstrate, IdentifyOptions, Synthesize
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import DynoRun, run
 from drivetwin.dyno.dyno import run as run_dyno
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import (
     convert_channels,
     format_card,

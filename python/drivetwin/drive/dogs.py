@@ -48,7 +48,7 @@ from drivetwin.gearbox import Gearbox, build_network_elements
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
 from drivetwin.simulation.element_schema import GROUND, list_ports
 from drivetwin.simulation.network import Output, Start, build_element, simulate
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 ENGAGED = 1e6
 """Torque capacity of an engaged dog, N m: above that of any road vehicle, since teeth hold."""

@@ -15,7 +15,7 @@ from drivetwin.errors import InputError
 from drivetwin.gearbox import Drive, Gearbox, Reduction, solve_gear
 from drivetwin.gearbox.spec import Capacity
 from drivetwin.simulation.dual_clutch import FloatArray, Signal
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 
 class Watched(StrEnum):

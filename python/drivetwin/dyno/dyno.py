@@ -14,8 +14,7 @@ import numpy as np
 
 from drivetwin.channels.roles import make_command_role, make_pressure_role
 from drivetwin.channels.shiftlog import Channel
-from drivetwin.dyno.actuators import ControlledActuator
-from drivetwin.dyno.scenario import Scenario, Sensor
+from drivetwin.dyno.scenario import ControlledActuator, Scenario, Sensor
 from drivetwin.dyno.truth import SENSOR_EFFECTS, Effects, Truth, check_effects, compute_truth
 from drivetwin.errors import InputError, SimulationError, Where
 from drivetwin.estimation.likelihood.effects.synthetic_vehicle import (

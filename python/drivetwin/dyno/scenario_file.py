@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from drivetwin._util.plain_values import format_json
+from drivetwin._util.arrays import format_json
 from drivetwin._util.text import format_csv_row
 from drivetwin._util.toml import read_toml
 from drivetwin.actuator.model import ActuatorModel
@@ -41,15 +41,19 @@ from drivetwin.channels.roles import (
 )
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR
-from drivetwin.dyno.actuators import Actuator, ControlledActuator, Fill, Program, Vibration
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import DynoRun
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario import (
+    Actuator,
+    ControlledActuator,
+    Fill,
     HeldGear,
     Plant,
+    Program,
     Scenario,
     Sensor,
     TorqueReduction,
+    Vibration,
     build_form,
     build_plant,
 )

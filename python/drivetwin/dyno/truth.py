@@ -11,8 +11,7 @@ from math import inf, pi, sqrt
 from typing import Any
 
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
-from drivetwin.dyno.actuators import ControlledActuator
-from drivetwin.dyno.scenario import Scenario
+from drivetwin.dyno.scenario import ControlledActuator, Scenario
 from drivetwin.errors import InputError, Where
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.parameters import get_parameter_spec

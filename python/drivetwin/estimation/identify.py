@@ -36,7 +36,7 @@ from drivetwin.estimation.result.verdict import (
 )
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import FINAL_DRIVE, OVER_ETA, get_parameter_spec, make_ratio_id
-from drivetwin.shifts.coverage import AFTER, BEFORE
+from drivetwin.shifts.detect import AFTER, BEFORE
 
 BEHIND_CONVERTER = (
     "the converter is open in the shifts: what drives the gearbox is its turbine, by the map on "

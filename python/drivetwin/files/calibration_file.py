@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import Field, FiniteFloat
 
-from drivetwin._util.plain_values import to_plain_values
+from drivetwin._util.arrays import to_plain_values
 from drivetwin._util.toml import parse_toml
 from drivetwin.calibration.calibrate import Calibration
 from drivetwin.calibration.certificate import LimitState

@@ -25,9 +25,8 @@ from pydantic import (
     model_validator,
 )
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, convert_nonfinite, format_json
 from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file, write_text
-from drivetwin._util.plain_values import convert_nonfinite, format_json
 from drivetwin._util.toml import raise_faults, validate_schema
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, ActuatorSource, IdentifiedActuator
 from drivetwin.errors import ResultFileError, Where

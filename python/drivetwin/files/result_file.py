@@ -14,10 +14,10 @@ from typing import Any, Literal
 
 from pydantic import Field, FiniteFloat, model_validator
 
+from drivetwin._util.arrays import format_json, to_plain_values
 from drivetwin._util.atomic import write_text
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.optional_dependencies import get_program_version
-from drivetwin._util.plain_values import format_json, to_plain_values
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.identification import Identification, LogPull, LogShare
 from drivetwin.estimation.result.cause import Group
@@ -40,7 +40,7 @@ from drivetwin.files.records import (
 from drivetwin.fit.examine import REPEATS, Improvement
 from drivetwin.likelihood.profile import Profile
 from drivetwin.shifts.shift import RejectedShift
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 
 class ConsistencyRecord(Record):

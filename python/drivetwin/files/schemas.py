@@ -14,6 +14,7 @@ from drivetwin.vehicle.card_fields import CardField, read_card_fields
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
+
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -73,7 +74,7 @@ def build_json_schema(kind: FileKind | str) -> dict[str, Any]:
     kind = FileKind(kind)
     head = {"$schema": _DIALECT, "title": f"drivetwin {kind}"}
     if kind is FileKind.ELEMENTS:
-        from drivetwin.files.element_json_schema import build_network_schema  # it loads NumPy
+        from drivetwin.simulation.element_schema import build_network_schema  # it loads NumPy
 
         return {**head, **build_network_schema()}
     module, name = _MODELS[kind]
@@ -112,7 +113,7 @@ def _iterate_tables(schema: dict[str, Any], node: dict[str, Any]) -> Iterator[di
 
 def _insert_elements(schema: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of a model file with that of its elements."""
-    from drivetwin.files.element_json_schema import build_network_schema  # it loads NumPy
+    from drivetwin.simulation.element_schema import build_network_schema  # it loads NumPy
 
     network = build_network_schema()
     definitions = {**schema["$defs"], **network.pop("$defs")}

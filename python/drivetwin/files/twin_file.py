@@ -11,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, FiniteFloat
 
+from drivetwin._util.arrays import to_plain_values
 from drivetwin._util.check_arguments import check_arguments
-from drivetwin._util.plain_values import to_plain_values
 from drivetwin._util.toml import Fault, parse_toml, raise_faults
 from drivetwin.channels.roles import (
     BusOptions,

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin._util.plain_values import format_json
+from drivetwin._util.arrays import FloatArray, format_json
 from drivetwin.channels.roles import ChannelSpec, Quantity
 from drivetwin.channels.units import find_unit
 from drivetwin.errors import InputError, SimulationError

@@ -33,7 +33,7 @@ from drivetwin.shifts.summary import (
     adjust_comparisons,
     compare_figures,
 )
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 _POINTS = 40
 _LEAST = 5

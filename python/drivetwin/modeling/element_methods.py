@@ -7,8 +7,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drivetwin.modeling.element_help import Plates, document_methods
-from drivetwin.modeling.model_components import Component, ModelComponents, Place
+from drivetwin.modeling.model_components import (
+    Component,
+    ModelComponents,
+    Place,
+    Plates,
+    document_methods,
+)
 from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.network import InputValue
 

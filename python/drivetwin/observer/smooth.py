@@ -44,7 +44,7 @@ from drivetwin.observer.linear_model import (
     is_driving,
     select_uncertain,
 )
-from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.detect import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import describe_added_elements

@@ -16,7 +16,7 @@ from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.plausibility.entries import PLAUSIBILITY, check_entries, find_entry
 from drivetwin.plausibility.friction import check_friction, check_inertias, sample_span
-from drivetwin.shifts.coverage import find_causes
+from drivetwin.shifts.detect import find_causes
 from drivetwin.shifts.shift import (
     HeldRatio,
     Shift,

@@ -42,7 +42,7 @@ from drivetwin.shifts.summary import (
     summarize_shifts,
 )
 from drivetwin.validation.simulate_log import clip_phases
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 _BESIDE = 3
 """So many shifts beside each other in a table."""

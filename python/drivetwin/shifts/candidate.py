@@ -35,8 +35,7 @@ from drivetwin.shifts.shift import (
     classify_shift,
     is_shared_pressure,
 )
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _NONE = -1

@@ -17,8 +17,7 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import InputError, MissingChannelError, TimeError, Where
 from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.quality.outliers import detect_quantization
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 

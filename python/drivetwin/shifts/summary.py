@@ -12,7 +12,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.findings import Code, Finding
 from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 LEVEL = 0.05
 """Probability of a false alarm of each test, corrected for the number of tests made together."""

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.rich_display import DisplayMixin
+from drivetwin._util.display_units import DisplayMixin
 from drivetwin.actuator.model import IdentifiedActuator
 from drivetwin.channels.roles import RememberedMapping
 from drivetwin.errors import InputError, MissingParameterError, Where
@@ -36,8 +36,14 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.shift_control import SpeedSensor
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import ElementKind, ElementSpec, Gear, PriorValue, move_clutch_ratios
+from drivetwin.vehicle.spec import (
+    ElementKind,
+    ElementSpec,
+    Gear,
+    PriorValue,
+    ShiftKind,
+    move_clutch_ratios,
+)
 from drivetwin.vehicle.vehicle_card import VehicleCard
 
 COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")

@@ -25,8 +25,7 @@ from drivetwin.estimation.result.verdict import assess
 from drivetwin.findings import Code, Finding, report
 from drivetwin.parameters import OVER_ETA
 from drivetwin.pipeline import identify, identify_jointly
-from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
-from drivetwin.shifts.detect import FoundShifts, detect_shifts
+from drivetwin.shifts.detect import FoundShifts, detect_shifts, trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine, require_locked_converter
 from drivetwin.shifts.shift import Shift, split_shared_gears
 from drivetwin.twin.build import build_twin

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Design data of a vehicle in SI: ratios, elements, converter, plausible ranges, distributions.
+"""Design data of a vehicle in SI: ratios, elements, converter, ranges, distributions; shift kinds.
 
 The distribution of a number as a person writes it is made here only. People round as well as cut.
 The true ratio is therefore uniform within one unit of the last written digit to either side, which
@@ -14,6 +14,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -23,6 +24,48 @@ from drivetwin._util.toml import StrictModel, WrittenNumber
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.channels.units import BAR, RPM
 from drivetwin.simulation.added_elements import Converter
+
+
+class ShiftKind(StrEnum):
+    """Direction and power state of a shift."""
+
+    POWER_ON_UP = "power-on upshift"
+    POWER_OFF_UP = "power-off upshift"
+    POWER_ON_DOWN = "power-on downshift"
+    POWER_OFF_DOWN = "power-off downshift"
+    POWER_UNKNOWN_UP = "upshift, power unknown"
+    POWER_UNKNOWN_DOWN = "downshift, power unknown"
+
+    @classmethod
+    def from_direction(cls, *, up: bool, power_on: bool | None) -> ShiftKind:
+        """Return the kind of an upshift, or downshift, with the power on, off or (None) unknown."""
+        if power_on is None:
+            return cls.POWER_UNKNOWN_UP if up else cls.POWER_UNKNOWN_DOWN
+        if up:
+            return cls.POWER_ON_UP if power_on else cls.POWER_OFF_UP
+        return cls.POWER_ON_DOWN if power_on else cls.POWER_OFF_DOWN
+
+    @property
+    def is_up(self) -> bool:
+        """True for an upshift."""
+        return self in (
+            ShiftKind.POWER_ON_UP,
+            ShiftKind.POWER_OFF_UP,
+            ShiftKind.POWER_UNKNOWN_UP,
+        )
+
+    @property
+    def has_torque_phase_first(self) -> bool:
+        """True where the on-coming element takes over the torque before the speeds change.
+
+        Shifts of unknown power count as those with the power on.
+        """
+        return self in (
+            ShiftKind.POWER_ON_UP,
+            ShiftKind.POWER_OFF_DOWN,
+            ShiftKind.POWER_UNKNOWN_UP,
+        )
+
 
 _PER_1000RPM = 1000.0 * RPM
 

@@ -17,8 +17,8 @@ from drivetwin.authoring.card_text import EntryPath, refuse_faults, replace_numb
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.question import Key
 from drivetwin.channels.mapping_file import find_project_mapping
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import format_card, format_log, load_scenario
 from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.validation import Validation

@@ -14,8 +14,7 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.estimation.data.prepare import prepare
 from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue, SensorTolerance
+from drivetwin.vehicle.spec import PriorValue, SensorTolerance, ShiftKind
 from tests.shifts.fixtures import make_card
 
 KINDS = {

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.likelihood.multistart import fit_multistart
 from drivetwin.estimation.likelihood.priors import build_problem

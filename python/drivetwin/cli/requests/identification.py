@@ -33,7 +33,7 @@ from drivetwin.cli.options import (
     quick_option,
     strict_flag,
 )
-from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno import ScenarioName
 from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.result.method import Method
 from drivetwin.vehicle.effects import EffectId

@@ -32,8 +32,12 @@ from drivetwin.estimation.data.shift_data import (
 )
 from drivetwin.likelihood.measured_signal import MeasuredSignal, prepare_signal
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
-from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
-from drivetwin.shifts.detect import FoundShifts, refuse_without_shifts
+from drivetwin.shifts.detect import (
+    FoundShifts,
+    refuse_without_shifts,
+    trim_to_recorded,
+    trim_to_window,
+)
 from drivetwin.shifts.lockup_clutch import (
     check_lockup_observed,
     refer_to_turbine,

@@ -14,8 +14,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import GearData, KnownDriveline, ShiftSignals
 from drivetwin.estimation.regression.modulating_functions import Windows, build_windows
 from drivetwin.likelihood.measured_signal import MeasuredSignal, prepare_signal
-from drivetwin.shifts.coverage import split_at_gaps
-from drivetwin.shifts.detect import find_gear_spans
+from drivetwin.shifts.detect import find_gear_spans, split_at_gaps
 from drivetwin.shifts.lockup_clutch import CLOSED, LockUp, compute_mean_slip, detect_lock_ups
 from drivetwin.shifts.shift import Shift
 from drivetwin.vehicle.spec import PriorValue

@@ -37,7 +37,7 @@ from drivetwin.estimation.regression.modulating_functions import (
 )
 from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.likelihood.prior import Prior
-from drivetwin.shifts.coverage import split_at_gaps
+from drivetwin.shifts.detect import split_at_gaps
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 WIDTH = 0.4

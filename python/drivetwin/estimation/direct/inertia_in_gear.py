@@ -28,7 +28,7 @@ from drivetwin.estimation.regression.modulating_functions import (
 )
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.likelihood.measured_signal import MeasuredSignal
-from drivetwin.shifts.coverage import split_at_gaps
+from drivetwin.shifts.detect import split_at_gaps
 
 
 @dataclass(frozen=True)

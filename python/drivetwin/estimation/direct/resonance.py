@@ -22,7 +22,7 @@ from drivetwin._util.arrays import FloatArray, Span
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.likelihood.measured_signal import MeasuredSignal
-from drivetwin.shifts.coverage import split_at_gaps
+from drivetwin.shifts.detect import split_at_gaps
 from drivetwin.shifts.shift import Shift
 
 _SCALE = np.array([2.0, 5.0])

@@ -13,7 +13,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.likelihood.measured_signal import MeasuredSignal
-from drivetwin.shifts.coverage import split_at_gaps
+from drivetwin.shifts.detect import split_at_gaps
 from drivetwin.simulation.dual_clutch import compute_series_inertia
 
 

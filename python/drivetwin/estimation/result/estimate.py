@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.rich_display import DisplayMixin
+from drivetwin._util.display_units import DisplayMixin
 from drivetwin.errors import suggest_spelling
 from drivetwin.parameters import ParameterSpec, get_parameter_spec
 from drivetwin.simulation.dual_clutch import RoadLoad, Stribeck

@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.rich_display import DisplayMixin
+from drivetwin._util.display_units import DisplayMixin
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.findings import Finding
 from drivetwin.likelihood.signal_fit import SignalFit

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.channels.shiftlog import FloatArray
-from drivetwin.logs.formats.cell_text import parse_numbers
-from drivetwin.logs.formats.code_texts import describe_faults, interpret_codes
+from drivetwin.logs.formats.cell_text import describe_faults, interpret_codes, parse_numbers
 
 _LISTED = 8
 """Largest number of texts of a table that are listed."""

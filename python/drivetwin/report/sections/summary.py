@@ -52,7 +52,7 @@ from drivetwin.report.figures.validation import (
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.twin.build import list_borrowed_friction
 from drivetwin.validation.simulate_log import EXTRA_SIGNALS, SIGNALS, pool_fits
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 Fits = Mapping[str, SignalFit]
 """Fit by phase."""

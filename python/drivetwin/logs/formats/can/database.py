@@ -23,7 +23,7 @@ from drivetwin._util.atomic import LARGEST_RECORD, measure_regular_file
 from drivetwin._util.optional_dependencies import handle_parser_errors, import_extra
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import FileFormatError
-from drivetwin.logs.formats.code_texts import CodeValues, interpret_codes
+from drivetwin.logs.formats.cell_text import CodeValues, interpret_codes
 from drivetwin.logs.raw import describe_origin, find_origin, subtract_origin
 
 

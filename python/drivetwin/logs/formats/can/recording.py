@@ -49,7 +49,7 @@ from drivetwin.logs.formats.can.j1939 import (
     derive_torque_name,
     get_group,
 )
-from drivetwin.logs.formats.code_texts import describe_faults
+from drivetwin.logs.formats.cell_text import describe_faults
 from drivetwin.logs.raw import MIN_SAMPLES, RawChannel, Window
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivetwin.vehicle.shift_kind import ShiftKind
+from drivetwin.vehicle.spec import ShiftKind
 
 
 def _read_power(kind: ShiftKind) -> bool | None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from drivetwin.channels.roles import BusOptions, ReadOptions
-from drivetwin.logs.formats.code_texts import CodeMeaning, classify_code_text
+from drivetwin.logs.formats.cell_text import CodeMeaning, classify_code_text
 from drivetwin.logs.read import read_raw
 
 FAULTS = (

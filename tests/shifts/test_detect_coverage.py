@@ -12,10 +12,9 @@ from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import DamagedChannelError
 from drivetwin.findings import render
-from drivetwin.shifts.coverage import trim_to_recorded, trim_to_window
+from drivetwin.shifts.detect import trim_to_recorded, trim_to_window
 from drivetwin.shifts.shift import Shift
-from drivetwin.vehicle.shift_kind import ShiftKind
-from drivetwin.vehicle.spec import PriorValue
+from drivetwin.vehicle.spec import PriorValue, ShiftKind
 
 OLDEST, YOUNGEST, LEAST, LETS_GO = 0.08, 0.02, 0.15, 0.3
 """Reach of the engine torque, shortest rest of a gear, time around an opening [s]."""
