@@ -43,8 +43,8 @@ from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.estimation.likelihood.mechanism import Mechanism, disable
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.findings import Code
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.effects import EffectId
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 STUDIES = ("validity", "rough")
 PARTS = ("preparation", "estimation")

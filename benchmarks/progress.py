@@ -47,8 +47,8 @@ from drivetwin.validation.validated_model import (
     identify_together,
     identify_validated,
 )
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import SensorTolerance
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from drivetwin.workbench.identifying import Task, identify_logs
 
 T = TypeVar("T")

@@ -30,8 +30,8 @@ from drivetwin.parameters import split_log_number
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.validation.validated_model import JointIdentification, Source, identify_together
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 COUNT = 40
 LEVEL, LOAD = 0.85, 2000.0

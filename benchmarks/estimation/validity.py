@@ -30,8 +30,8 @@ from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.effects import EffectId, EffectPrior
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 MODE_HZ = (28.0, 110.0)
 """Range of the frequency of an input-shaft mode [Hz]."""

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.speed import c_peer, shift
-from drivetwin.simulation.batch import Batch, Keep
 from drivetwin.simulation.driveline import SHAFT
 from drivetwin.simulation.dual_clutch import FloatArray
+from drivetwin.simulation.network import Batch, Keep
 from drivetwin.simulation.network_response import NetworkScenario, simulate_network_batch
 from tests.support.upshift.scenario import build_scenario
 from tests.support.upshift.statement import BAR, Inputs, Problem, make_inputs, make_problem, start

@@ -25,8 +25,8 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD, Method
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.plausibility.check import check_card
 from drivetwin.shifts.detect import FoundShifts, find_causes
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.locks import apply_locks, collect_locks
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 def require_compatible(logs: Sequence[ShiftLog]) -> None:

@@ -14,8 +14,7 @@ from drivetwin.authoring.questions import Sources
 from drivetwin.authoring.session import CardOptions, Session, parse_options
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.mapping_file import read_mapping
-from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard, load_card
 
 VALID = {
     "name": "truck", "gearbox": "none", "ratios": "1.86, 1.41", "names": "2,3",

@@ -16,7 +16,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.method import Method
 from drivetwin.likelihood.covariance import compute_covariance
 from drivetwin.pipeline import identify
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard
 from tests.support.bench import NO_EFFECT, read_run
 from tests.support.shared_results import shared
 

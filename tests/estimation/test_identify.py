@@ -29,10 +29,9 @@ from drivetwin.pipeline import identify
 from drivetwin.shifts.detect import FoundShifts, detect_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
-from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 ROOT = Path(__file__).parents[2]
 LOGS = ROOT.parent / "shared" / "logs"

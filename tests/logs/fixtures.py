@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard, load_card
 from tests.support.arrays import FloatArray
 
 CARD = """

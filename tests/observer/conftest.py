@@ -19,7 +19,7 @@ from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import Trajectory
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard
 from tests.support.arrays import FloatArray
 
 

@@ -20,9 +20,8 @@ from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_fit, clip_phases
-from drivetwin.vehicle.card import ElementSpec, Gear
+from drivetwin.vehicle.card import ElementSpec, Gear, VehicleCard
 from drivetwin.vehicle.spec import PriorValue, ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.arrays import FloatArray
 
 TIME = np.arange(0.0, 3.0, 1e-3)

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.logs.read import read_log
-from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.vehicle.spec import ElementSpec, Gear, PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 FloatArray = NDArray[np.float64]
 

@@ -12,9 +12,8 @@ from drivetwin.findings import Code
 from drivetwin.logs.read import read_log
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.lockup_clutch import detect_lock_ups
-from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.vehicle.spec import ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import ROOT, shared
 
 EVENTS = {

@@ -12,8 +12,8 @@ from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.shifts.detect import detect_shifts
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.support.bench import read_run
 
 KINDS = {

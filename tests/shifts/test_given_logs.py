@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from drivetwin.shifts.detect import detect_shifts
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue, ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import load_measured, load_reference, make_card
 
 _CASES = ("upshift", "drum_inertia", "weak_then_catch")

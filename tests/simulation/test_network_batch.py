@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.simulation.batch import Keep
 from drivetwin.simulation.dual_clutch import Signal
-from drivetwin.simulation.network import Element, Output, Sine, Start, build_element, simulate
+from drivetwin.simulation.network import Element, Keep, Output, Sine, Start, build_element, simulate
 from drivetwin.simulation.network_response import (
     NetworkScenario,
     differentiate_network_batch,

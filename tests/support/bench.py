@@ -25,9 +25,9 @@ from drivetwin.estimation.data.shift_data import (
 from drivetwin.estimation.identification import Identification
 from drivetwin.likelihood.measured_signal import prepare_signal
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue, ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 NO_EFFECT = {effect: EffectPrior(0.0) for effect in EffectId}
 """Statement of a card that the model leaves nothing out, as is true of the dynamometer."""

@@ -15,10 +15,9 @@ import pytest
 
 from drivetwin import _native
 from drivetwin.errors import SimulationError
-from drivetwin.simulation.batch import Keep
 from drivetwin.simulation.dual_clutch import Accuracy, Signal
 from drivetwin.simulation.element_schema import as_json
-from drivetwin.simulation.network import Sine, Start, simulate
+from drivetwin.simulation.network import Keep, Sine, Start, simulate
 from drivetwin.simulation.network_response import to_core_scenarios
 from drivetwin.simulation.network_sensitivity import differentiate
 from tests.simulation.test_batch import (

@@ -11,9 +11,8 @@ import pytest
 
 from drivetwin.channels.roles import ChannelSpec
 from drivetwin.errors import CardError
-from drivetwin.vehicle.card import load_card
+from drivetwin.vehicle.card import VehicleCard, load_card
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.logs.fixtures import CARD
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "vehicles"

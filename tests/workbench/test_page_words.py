@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2] / "python" / "drivetwin"
 ABOVE = ("cli", "fleet", "calibration", "observer", "estimation/multi_log", "estimation/analysis")
 """Packages whose messages the workbench never shows."""
 ELSEWHERE = ("workbench/server.py", "report/results.py", "vehicle/spec.py",
-             "validation/validated_model.py", "files/limits_file.py", "errors.py")  # fmt: skip
+             "validation/validated_model.py", "files/calibration_file.py", "errors.py")  # fmt: skip
 """Files whose messages it never shows."""
 COMMAND = re.compile(r"(?<![\w-])--[a-z]|'drivetwin ")
 

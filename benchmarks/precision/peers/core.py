@@ -14,9 +14,8 @@ from benchmarks.precision.linear import TIME, LinearProblem
 from benchmarks.precision.shift import BatchProblem
 from benchmarks.speed.batch import simulate_sets
 from benchmarks.speed.core import Example
-from drivetwin.simulation.batch import Keep
 from drivetwin.simulation.dual_clutch import Accuracy, FloatArray
-from drivetwin.simulation.network import simulate
+from drivetwin.simulation.network import Keep, simulate
 from tests.support.upshift.scenario import Scenario, build_scenario
 
 NAME = "drivetwin"

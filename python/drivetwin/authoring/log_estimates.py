@@ -25,6 +25,7 @@ from drivetwin.plausibility.friction import (
 from drivetwin.shifts.breakaway_lockup import locate_torque_dip, smooth_channel
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import (
     ElementKind,
@@ -36,7 +37,6 @@ from drivetwin.vehicle.spec import (
     describe_fill_pressure,
     describe_inertia,
 )
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 USUAL_FILL = PriorValue(0.8 * BAR, 0.4 * BAR)
 """P0 [Pa] assumed to find the phases of a shift as long as it is unknown."""

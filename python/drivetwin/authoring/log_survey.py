@@ -32,9 +32,9 @@ from drivetwin.logs.raw import Remembered
 from drivetwin.logs.read import Demands, read_recording
 from drivetwin.plausibility.entries import PLAUSIBILITY
 from drivetwin.shifts.shift import GearboxSpeeds, ShiftSettings, find_held_ratios, resample_geared
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ElementSpec, PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 ENGAGED = 0.5
 """Least pressure of an engaged element over the largest mean pressure of its column."""

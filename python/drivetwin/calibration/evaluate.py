@@ -19,10 +19,9 @@ from drivetwin.calibration.metrics import (
     list_outputs,
 )
 from drivetwin.calibration.scenarios import Scenarios
-from drivetwin.simulation.batch import BatchRequest, Keep
 from drivetwin.simulation.dual_clutch import ENGINE_TORQUE, Signal
 from drivetwin.simulation.element_schema import as_json
-from drivetwin.simulation.network import Output, to_native
+from drivetwin.simulation.network import BatchRequest, Keep, Output, to_native
 from drivetwin.simulation.network_response import NetworkScenario, to_core_scenarios
 from drivetwin.simulation.shift_control import simulate_network_controlled
 

@@ -33,10 +33,10 @@ from drivetwin.twin.build import build_twin
 from drivetwin.twin.distribution import ModelDistribution, describe_model
 from drivetwin.twin.twin import PRESSURE_DELAY, SIMULATED, Twin
 from drivetwin.validation.simulate_log import attach_validation, simulate_shift
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.locks import Lock, LockKind, apply_locks
 from drivetwin.vehicle.spec import PriorValue, SensorTolerance, SumPrior
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _UNIT_STD = {"k_o": 0.03, "c_o": 0.2, "J_prime": 0.02, "J_vehicle": 0.02}
 """Relative standard deviations between made units, by stem, of what `Spread` leaves out:

@@ -65,17 +65,15 @@ from drivetwin.export.parameters.files import (
 from drivetwin.export.parameters.of_twin import collect_calibration
 from drivetwin.files.calibration_file import (
     Provenance,
+    Requirements,
     build_calibration_document,
     build_calibration_file,
     build_certificate_document,
-    read_calibration_file,
-    write_calibration_file,
-)
-from drivetwin.files.limits_file import (
-    Requirements,
     build_user_controller,
     load_controller_file,
     load_limits,
+    read_calibration_file,
+    write_calibration_file,
 )
 from drivetwin.files.records import dump_findings
 from drivetwin.files.result_file import load_result

@@ -38,8 +38,7 @@ from drivetwin.plausibility.check import check_card, merge_ratios, select_card_f
 from drivetwin.report.blocks import Outcome, build_findings_section, make_notes
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.shifts.shift import find_held_ratios, resample_geared
-from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard, load_card
 
 
 def new(request: NewCard) -> Outcome:

@@ -21,8 +21,7 @@ from drivetwin.logs.formats.detect import is_binary_log
 from drivetwin.logs.raw import HEAD_BYTES
 from drivetwin.logs.read import read_log
 from drivetwin.twin.twin import Twin
-from drivetwin.vehicle.card import load_card
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard, load_card
 
 
 def find_mapping(channels: Path | None, log: Path) -> Mapped:

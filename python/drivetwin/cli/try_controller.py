@@ -15,7 +15,7 @@ from drivetwin.cli.export import parse_gears
 from drivetwin.cli.options import REPORT
 from drivetwin.cli.output import show_step, write_texts
 from drivetwin.cli.requests.use import Try
-from drivetwin.files.limits_file import STOCK, TrialFile, load_trials
+from drivetwin.files.calibration_file import STOCK, TrialFile, load_trials
 from drivetwin.report.blocks import Outcome
 from drivetwin.report.trial import build_trial_blocks, build_trials_page, format_junit
 from drivetwin.twin.twin import Twin

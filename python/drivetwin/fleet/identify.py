@@ -57,8 +57,7 @@ from drivetwin.report.html import build_report_page, save_library, save_page
 from drivetwin.shifts.detect import FoundShifts, require_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
-from drivetwin.vehicle.card import load_card, load_ratio_card
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard, load_card, load_ratio_card
 
 LIBRARY = "plotly.js"
 

@@ -35,7 +35,7 @@ from drivetwin.channels.units import (
 )
 from drivetwin.errors import DamagedChannelError, UnitError, Where
 from drivetwin.logs.raw import RawChannel, Recording
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard
 
 _MOST_CANDIDATES = 8
 """Candidates that are listed for a role [count]."""

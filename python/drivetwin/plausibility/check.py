@@ -25,8 +25,8 @@ from drivetwin.shifts.shift import (
     is_held,
     resample_speeds,
 )
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 ABOVE = 1.2
 """Least ratio of the largest pressure of an element that engages to its P0."""

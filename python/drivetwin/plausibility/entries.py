@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from drivetwin.channels.units import BAR, RPM
 from drivetwin.errors import Where
 from drivetwin.findings import Code, Finding, report
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.vehicle.spec import ElementSpec
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 Limits = tuple[float, float]
 

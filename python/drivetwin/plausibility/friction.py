@@ -15,8 +15,8 @@ from drivetwin.channels.units import BAR
 from drivetwin.findings import Code, Finding, report
 from drivetwin.plausibility.entries import PLAUSIBILITY, Limits, find_entry, get_gain_key
 from drivetwin.shifts.shift import Shift, make_shift_labels
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.card_fields import get_card_field
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 POINTS = 60
 """Instants at which a span is sampled."""

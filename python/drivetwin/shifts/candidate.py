@@ -35,8 +35,8 @@ from drivetwin.shifts.shift import (
     classify_shift,
     is_shared_pressure,
 )
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue, ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _NONE = -1
 _STANDING = -2

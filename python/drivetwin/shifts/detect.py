@@ -57,8 +57,8 @@ from drivetwin.shifts.shift import (
     is_shared_pressure,
     resample_speeds,
 )
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _EDGE = 0.2
 """Share of a gear held that is left out at both ends: there the pressures of a shift act."""

@@ -19,7 +19,7 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog, find_uncovered_ends
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.shifts.shift import RejectedShift, Shift
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard
 
 _GLITCH = 0.05
 """A flag that changes for a shorter time [s] than this was sent wrongly, or by another sender."""

@@ -11,8 +11,8 @@ from drivetwin._util.arrays import FloatArray, filter_zero_phase
 from drivetwin.channels.roles import make_command_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog, compute_gap_limit
 from drivetwin.shifts.shift import GearboxSpeeds, Shift, compute_gear_ratios, resample_speeds
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 _LATEST_REQUEST = 3.0
 """Longest time [s] from a request to the begin of the inertia phase."""

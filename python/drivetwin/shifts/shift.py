@@ -17,8 +17,8 @@ from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import InputError, MissingChannelError, TimeError, Where
 from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.quality.outliers import detect_quantization
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue, ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,6 @@ import numpy as np
 
 from drivetwin._native import network_response
 from drivetwin.errors import InputError
-from drivetwin.simulation.batch import (
-    Batch,
-    BatchRequest,
-    BatchSensitivities,
-    CoreScenario,
-    Keep,
-    require_unknowns,
-)
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
     FloatArray,
@@ -27,11 +19,17 @@ from drivetwin.simulation.dual_clutch import (
 )
 from drivetwin.simulation.element_schema import as_json
 from drivetwin.simulation.network import (
+    Batch,
+    BatchRequest,
+    BatchSensitivities,
+    CoreScenario,
     Element,
+    Keep,
     NativeOutput,
     Output,
     Sine,
     Start,
+    require_unknowns,
     resolve_outputs,
     simulate,
     to_core_sines,

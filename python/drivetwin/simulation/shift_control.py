@@ -19,7 +19,6 @@ from pydantic import Field
 from drivetwin._native import simulate_controlled as native_simulate_controlled
 from drivetwin.actuator.model import ActuatorModel
 from drivetwin.errors import ControllerError, InputError, Where
-from drivetwin.simulation.batch import stack_sets
 from drivetwin.simulation.driveline_run import load_library
 from drivetwin.simulation.dual_clutch import (
     ENGINE_TORQUE,
@@ -29,7 +28,7 @@ from drivetwin.simulation.dual_clutch import (
     to_delayed_core_samples,
 )
 from drivetwin.simulation.element_schema import as_array, as_json
-from drivetwin.simulation.network import Element, Output, Start
+from drivetwin.simulation.network import Element, Output, Start, stack_sets
 from drivetwin.simulation.network_response import NetworkScenario, resolve_native
 from drivetwin.simulation.network_sensitivity import require_numbers
 

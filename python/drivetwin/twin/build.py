@@ -48,7 +48,7 @@ from drivetwin.vehicle.spec import PARTNER_LEVEL_STD, PriorValue
 
 if TYPE_CHECKING:
     from drivetwin.simulation.dual_clutch import LossLaw
-    from drivetwin.vehicle.vehicle_card import VehicleCard
+    from drivetwin.vehicle.card import VehicleCard
 
 
 @check_arguments

@@ -36,6 +36,7 @@ from drivetwin.simulation.dual_clutch import (
     Stribeck,
 )
 from drivetwin.simulation.shift_control import SpeedSensor
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import (
     ElementKind,
     ElementSpec,
@@ -44,7 +45,6 @@ from drivetwin.vehicle.spec import (
     ShiftKind,
     move_clutch_ratios,
 )
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 COMMON = ("eta", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o")
 """Parameters that every model of a twin needs, besides a J′."""

@@ -31,7 +31,7 @@ from drivetwin.shifts.shift import Shift, split_shared_gears
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import attach_fit, attach_validation, simulate_shift
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard
 
 _STAGES = TimedStages("validated model", ("identification", "simulation"))
 

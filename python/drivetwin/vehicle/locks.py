@@ -18,8 +18,8 @@ from pydantic import Field
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.parameters import SPECS, get_parameter_spec
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 class LockKind(StrEnum):

@@ -23,8 +23,7 @@ from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import Source, identify_together
-from drivetwin.vehicle.card import RatioCard
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import RatioCard, VehicleCard
 from drivetwin.workbench.jobs import Emit
 from drivetwin.workbench.what_if import parse_number
 

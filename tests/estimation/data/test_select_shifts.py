@@ -15,8 +15,8 @@ from drivetwin.channels.shiftlog import Channel
 from drivetwin.estimation.data.select_shifts import select_shifts
 from drivetwin.likelihood.measured_signal import prepare_signal
 from drivetwin.shifts.shift import RejectedShift, Shift
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import ShiftKind
-from drivetwin.vehicle.vehicle_card import VehicleCard
 from tests.shifts.fixtures import make_card
 from tests.support.arrays import FloatArray
 

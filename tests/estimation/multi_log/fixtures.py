@@ -12,7 +12,7 @@ from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.simulation.dual_clutch import RoadLoad
 from drivetwin.validation.validated_model import JointIdentification, Source, identify_together
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard
 from tests.estimation.asked import DURATION
 from tests.support.bench import read_run
 from tests.support.shared_results import shared

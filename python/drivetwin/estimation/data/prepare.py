@@ -44,6 +44,7 @@ from drivetwin.shifts.lockup_clutch import (
     require_locked_converter,
 )
 from drivetwin.shifts.shift import RejectedShift, Shift, get_shift_pressures
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import (
     CONVERTER_POINT_STD,
     CONVERTER_SCALE_STD,
@@ -53,7 +54,6 @@ from drivetwin.vehicle.spec import (
     SensorTolerance,
     multiply,
 )
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 MIN_SAMPLES = 10
 """Fewest samples of a speed in a gear whose mean is used [count]."""

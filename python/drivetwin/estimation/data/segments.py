@@ -17,8 +17,8 @@ from drivetwin.likelihood.measured_signal import MeasuredSignal, prepare_signal
 from drivetwin.shifts.detect import find_gear_spans, split_at_gaps
 from drivetwin.shifts.lockup_clutch import CLOSED, LockUp, compute_mean_slip, detect_lock_ups
 from drivetwin.shifts.shift import Shift
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 SETTLED = 0.3
 """Left out after a lock-up [s]."""

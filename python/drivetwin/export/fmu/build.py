@@ -35,8 +35,8 @@ from drivetwin.export.entries import (
     sample_inputs,
 )
 from drivetwin.export.fmu.describe import Header, Role, Variable, build_description, list_variables
-from drivetwin.export.parameters import ssv
 from drivetwin.export.parameters.content import ParameterSet, Scalar, format_document
+from drivetwin.export.parameters.xml_files import SSV_CODEC
 from drivetwin.export.targets import DEFAULT_STEP, FmiVersion, InputKind, Platform
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
@@ -143,7 +143,7 @@ def build_reference_files(
     subject: Subject, experiment: Experiment | None, version: FmiVersion
 ) -> dict[str, bytes]:
     """Files of the archive by path; without an experiment only the parameter set."""
-    files = {"resources/parameters.ssv": ssv.CODEC.text(_format_parameters(subject)).encode()}
+    files = {"resources/parameters.ssv": SSV_CODEC.text(_format_parameters(subject)).encode()}
     related = [(_PARAMETERS, "application/x-ssp-parameter-set", "parameter")]
     if experiment is not None:
         files |= _build_experiment_files(subject, experiment, version)

@@ -19,7 +19,6 @@ from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import find_unit, get_time_factor, is_time_unit, list_first_spellings
 from drivetwin.errors import FileFormatError, InputError, Where, suggest_spelling
-from drivetwin.export.parameters import cdfx, csv_file, dcm, matlab, ssv
 from drivetwin.export.parameters.content import (
     Axis,
     Curve,
@@ -33,6 +32,8 @@ from drivetwin.export.parameters.content import (
     to_ascii_line,
     to_one_line,
 )
+from drivetwin.export.parameters.text_files import CSV_CODEC, DCM_CODEC, MATLAB_CODEC
+from drivetwin.export.parameters.xml_files import CDFX_CODEC, SSV_CODEC
 from drivetwin.parameters import get_parameter_spec
 
 _QUANTITIES = {
@@ -282,11 +283,11 @@ class ParameterFormat(StrEnum):
 
 
 CODECS = {
-    ParameterFormat.SSV: ssv.CODEC,
-    ParameterFormat.CDFX: cdfx.CODEC,
-    ParameterFormat.DCM: dcm.CODEC,
-    ParameterFormat.M: matlab.CODEC,
-    ParameterFormat.CSV: csv_file.CODEC,
+    ParameterFormat.SSV: SSV_CODEC,
+    ParameterFormat.CDFX: CDFX_CODEC,
+    ParameterFormat.DCM: DCM_CODEC,
+    ParameterFormat.M: MATLAB_CODEC,
+    ParameterFormat.CSV: CSV_CODEC,
 }
 
 

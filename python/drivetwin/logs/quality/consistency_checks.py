@@ -18,8 +18,8 @@ from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, 
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.logs.quality.outliers import Damage
 from drivetwin.logs.quality.time_alignment import IN_GEAR, SIGNIFICANT, estimate_final_drive
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import Z95
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 MAX_JUMP, MAX_ACCELERATION = 40.0, 2500.0
 """Speed change [rad/s] and rate [rad/s2] that no wheel shows between samples."""

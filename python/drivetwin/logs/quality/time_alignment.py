@@ -19,8 +19,8 @@ from scipy.ndimage import uniform_filter1d
 from drivetwin._util.arrays import integrate_trapezoids, remember_for_arrays
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.findings import Code, Finding, Number, report
+from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 GRID = 0.01
 """Raster [s] on which the speeds are compared."""

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from drivetwin._util.display_units import BAR
 from drivetwin.logs.survey import Column
 from drivetwin.report.blocks import TableBlock, make_table
-from drivetwin.vehicle.card import RatioCard
+from drivetwin.vehicle.card import RatioCard, VehicleCard
 from drivetwin.vehicle.spec import PriorValue
-from drivetwin.vehicle.vehicle_card import VehicleCard
 
 
 def build_column_table(

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
 from drivetwin.simulation.added_elements import NO_ADDED_ELEMENTS
-from drivetwin.simulation.batch import Batch, BatchSensitivities, Keep
 from drivetwin.simulation.driveline import build_driveline, build_start
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
@@ -27,7 +26,14 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Stribeck,
 )
-from drivetwin.simulation.network import NetworkRun, Output, simulate
+from drivetwin.simulation.network import (
+    Batch,
+    BatchSensitivities,
+    Keep,
+    NetworkRun,
+    Output,
+    simulate,
+)
 from drivetwin.simulation.network_response import (
     NetworkScenario,
     differentiate_network_batch,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivetwin.errors import InputError
-from drivetwin.files.limits_file import build_user_controller, load_controller_file
+from drivetwin.files.calibration_file import build_user_controller, load_controller_file
 
 TABLE = """source = "a.c"
 oil_temperature_C = 90

@@ -14,7 +14,7 @@ from drivetwin.calibration.metrics import METRICS, Metric
 from drivetwin.calibration.objective import Hardware, Limit, Statistic, build_limit_keys
 from drivetwin.calibration.spread import Spread
 from drivetwin.errors import InputError
-from drivetwin.files.limits_file import load_limits
+from drivetwin.files.calibration_file import load_limits
 
 
 @given(st.dictionaries(st.sampled_from(sorted(build_limit_keys())), st.floats(1e-6, 1e9)))
