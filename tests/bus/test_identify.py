@@ -16,6 +16,7 @@ import pytest
 from drivetwin.bus.identify import identify_bus
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import MissingChannelError, NoShiftError
+from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.findings import Code, Finding
 from drivetwin.logs.read import read_log
 from drivetwin.vehicle.card import load_ratio_card
@@ -176,6 +177,10 @@ def test_a_decay_that_contradicts_does_not_spoil_the_others() -> None:
     found = identify_bus(logs, card, [read_public("truck_holdout_short/w5.csv")])
     frequency, std = found.decays["8"].compute_frequency()
     assert 2.9 < frequency < 3.4  # each decay alone has 2.5 to 3.4 Hz
+    kinds = found.decays["8"].combined.groups
+    hertz = {kind: one.value[1] / (2.0 * np.pi) for kind, one in kinds.items()}
+    assert hertz == pytest.approx({"upshifts": 3.32, "downshifts": 3.06}, abs=0.15)
+    assert found.estimates["f_d_8"].verdict is Verdict.WEAK
     assert std < 0.15
     (one,) = found.predictions.values()
     assert one.share_inside > 0.85
@@ -191,6 +196,11 @@ def test_an_engine_faster_than_the_turbine_for_seconds_is_a_converter() -> None:
     assert "converter" in found.estimates["J_engine"].reason
     for name, right in zip("1234567", (5.0, 3.2, 2.143, 1.72, 1.313, 1.0, 0.823), strict=True):
         assert found.estimates[f"ratio_{name}"].value == pytest.approx(right, rel=0.01)
+        assert found.estimates[f"ratio_{name}"].verdict is Verdict.IDENTIFIED
+    # Both speeds come in one message of 15 ms, in two rows that are 2 µs apart too.
+    delay = found.estimates["speed_delay.output_speed"]
+    assert delay.verdict is Verdict.WEAK
+    assert 1e-4 < (delay.std_total or 0.0) < 1e-3
     assert not select(found.findings, Code.RATIO_UNKNOWN)
 
 

@@ -64,7 +64,7 @@ def test_kinds_that_differ_are_compared_within_themselves() -> None:
     assert not found.contradicting
     apart = found.groups["down"].value - found.groups["up"].value
     assert apart == pytest.approx([20.0, 0.0], abs=3.0)
-    estimate = make_estimate("ratio", "1", 2.0, 0.001, found)
+    estimate = make_estimate("f_d", "1", 2.0, 0.001, found)
     assert estimate.verdict is Verdict.WEAK
     alike = combine([replace(one, value=np.array([3.0, -1.0])) for one in ends])
     assert alike is not None

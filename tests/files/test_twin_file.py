@@ -74,6 +74,9 @@ def test_a_wrong_entry_is_told_by_its_key(tmp_path: Path, key: str, value: Any, 
     ("table", "old", "new", "says"),
     [
         ("parameters", "k_o", "k_oo", "unknown parameter id 'k_oo'"),
+        # Numbers of a twin that earlier versions corrected by logs.
+        ("parameters", "k_o", "te_lag", "unknown parameter id 'te_lag'"),
+        ("parameters", "k_o", "capacity_slope.B3", "unknown parameter id 'capacity_slope.B3'"),
         ("friction", "B3", "B7", "no element 'B7'"),
         ("actuators", "B3", "B7", "no element 'B7'"),
     ],

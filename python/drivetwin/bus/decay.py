@@ -14,7 +14,7 @@ drop out (separable least squares); σ and ω are searched for all decays at onc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,10 +193,13 @@ def build_columns(time: FloatArray, swing: Swing) -> FloatArray:
     return np.column_stack([np.ones_like(time), time, fall * np.cos(angle), fall * np.sin(angle)])
 
 
-def fit_decays(records: Sequence[DecayRecord], start: Swing | None = None) -> JointDecay | None:
+def fit_decays(
+    records: Sequence[DecayRecord], start: Swing | None = None, late_std: float = 0.0
+) -> JointDecay | None:
     """Fit one oscillator to all decays of a gear; None if it is not determined.
 
-    `start` is the oscillator that the search begins with, None to look for it.
+    `start` is the oscillator that the search begins with, None to look for it. `late_std` [s] is
+    the standard deviation of the dead time of the torque, an error that all decays have in common.
     """
     swing = start or _find_start(records)
     if swing is None:
@@ -212,7 +215,7 @@ def fit_decays(records: Sequence[DecayRecord], start: Swing | None = None) -> Jo
             return None
         if left < DECAY.converged:
             break
-    return _finish(thinned, swing, sizes, step)
+    return _finish(thinned, swing, sizes, step, late_std)
 
 
 def _climb(
@@ -229,12 +232,21 @@ def _climb(
 
 
 def _finish(
-    records: Sequence[DecayRecord], swing: Swing, sizes: Sequence[NoiseSize], step: float
+    records: Sequence[DecayRecord],
+    swing: Swing,
+    sizes: Sequence[NoiseSize],
+    step: float,
+    late_std: float,
 ) -> JointDecay | None:
+    sizes = _raise_to_usual(sizes)
     values = [_find_own(one, swing, size) for one, size in zip(records, sizes, strict=True)]
     combined = combine(values)
     if combined is None:
         return None
+    later = [replace(one, late=one.late + late_std) for one in records]
+    moved = _climb(later, swing, sizes)[0]
+    move = np.array([moved.rate - swing.rate, moved.omega - swing.omega])
+    combined = replace(combined, covariance=combined.covariance + np.outer(move, move))
     found = Swing(max(float(combined.value[0]), 1e-9), float(combined.value[1]))
     fits = tuple(
         DecayFit(one, size, np.zeros(one.time.size) if made is None else made.mean)
@@ -429,8 +441,15 @@ def predict_decay(joint: JointDecay, record: DecayRecord, periods: float = 1.0) 
 
 
 def _take_median(sizes: Sequence[NoiseSize]) -> NoiseSize:
-    rows = np.array([(one.white, one.drift, one.swing) for one in sizes])
+    rows = np.array([astuple(one) for one in sizes])
     return NoiseSize(*map(float, np.sqrt(np.median(rows**2, axis=0))))
+
+
+def _raise_to_usual(sizes: Sequence[NoiseSize]) -> list[NoiseSize]:
+    """Raise each noise to the median of the decays: the few periods of a decay determine its noise
+    to a factor, and a small one by chance would outweigh all others."""
+    usual = astuple(_take_median(sizes))
+    return [NoiseSize(*np.maximum(astuple(one), usual).tolist()) for one in sizes]
 
 
 def _extrapolate(

@@ -122,9 +122,9 @@ def identify_bus(
     made.findings += remarks
     made.add_alignment(aligned)
     made.add_decays(_collect_decays(timelines, ratios))
-    dead = find_dead_time(timelines, ratios, late, made.decays)
+    dead, dead_std = find_dead_time(timelines, ratios, late, made.decays) or (None, 0.0)
     if dead is not None:  # the torque drives the oscillation of the decays too
-        made.add_decays(_collect_decays(timelines, ratios, dead))
+        made.add_decays(_collect_decays(timelines, ratios, dead), dead_std)
     torques = estimate_torques(timelines, ratios, late, made.decays, card)
     made.report_decays()
     made.estimates |= torques.estimates
@@ -317,13 +317,15 @@ class _ResultBuilder:
                 report(Code.BUS_RATIO_DIFFERS, gear=gear, found=value, half=half, card=stated.value)
             )
 
-    def add_decays(self, records: Mapping[str, Sequence[DecayRecord]]) -> None:
-        """Fit the decays of each gear."""
+    def add_decays(
+        self, records: Mapping[str, Sequence[DecayRecord]], dead_std: float = 0.0
+    ) -> None:
+        """Fit the decays of each gear; `dead_std` [s] is that of the dead time of the torque."""
         for gear in self.ratios:
             if gear not in records:
                 continue
             known = self.decays.get(gear)
-            joint = fit_decays(records[gear], None if known is None else known.swing)
+            joint = fit_decays(records[gear], known.swing if known else None, dead_std)
             if joint is None or not joint.chance < RING_DOWN.chance:
                 self.refused[gear] = explain(Code.BUS_NO_DECAY)
             elif reason := joint.explain_implausible():

@@ -32,8 +32,12 @@ class Signal:
 
     @cached_property
     def slopes(self) -> FloatArray:
-        """Central differences (n,) of the values over time."""
-        return np.asarray(np.gradient(self.values, self.time))
+        """Central differences (n,) of the values over a usual step to both sides: two stamps that
+        nearly agree determine no rate."""
+        step = float(np.median(np.diff(self.time)))
+        ends = [np.clip(self.time + one, *self.time[[0, -1]]) for one in (-step, step)]
+        first, last = (self.interpolate(one) for one in ends)
+        return np.asarray((last - first) / (ends[1] - ends[0]))
 
     def interpolate(self, time: FloatArray) -> FloatArray:
         """Values at `time` (m,), linear between the samples."""

@@ -30,9 +30,6 @@ from drivetwin.vehicle.spec import Z95
 
 CONTRADICTION = 0.01
 """Probability of a test of agreement below which shifts contradict each other, as between logs."""
-_LEAST_FREEDOM = 3.0
-"""Degrees of freedom of an interval below which a wrong shift looks like scatter: of four shifts,
-with three degrees, the other three agree and show it."""
 _SMALLEST = 1e-12
 """Relative eigenvalue below which a direction carries no information."""
 
@@ -284,14 +281,13 @@ def make_estimate(
     stem: str, suffix: str, value: float, std: float, combined: Combined, note: str = ""
 ) -> Estimate:
     """Estimate with a verdict from the interval; it is weak at best from one shift alone, and where
-    few shifts, or two kinds of them, contradict each other. The interval includes the scatter of
-    more."""
+    the shifts contradict each other. Shifts cannot differ in a ratio, a number of teeth: their
+    scatter is an error of measurement, which the interval includes."""
     name = make_id(stem, suffix)
     found = assess(name, value, std, METHOD, note=note, spec=get_spec(stem, suffix))
     p, is_single = combined.p_value, combined.count == 1
-    is_few = float(np.min(combined.freedom)) < _LEAST_FREEDOM
-    is_unsure = p < CONTRADICTION and (is_few or bool(combined.groups))
-    if found.verdict is Verdict.NOT_IDENTIFIABLE or not (is_single or is_unsure):
+    is_unsure = is_single or (p < CONTRADICTION and stem != RATIO)
+    if found.verdict is Verdict.NOT_IDENTIFIABLE or not is_unsure:
         return found
     cause = explain(Code.BUS_ONE_SHIFT) if is_single else explain(Code.BUS_SCATTERS, p=p)
     return replace(found, verdict=Verdict.WEAK, reason=join_reasons(cause, found.reason))

@@ -57,8 +57,9 @@ def find_dead_time(
     ratios: Mapping[str, float],
     late: Mapping[str, float],
     decays: Mapping[str, JointDecay],
-) -> float | None:
-    """First look at the dead time [s] of the torque message: of the open clutch, else in gear.
+) -> tuple[float, float] | None:
+    """First look at the dead time [s] of the torque message and its standard deviation: of the open
+    clutch, else in gear.
 
     None where there is no torque, or an interval wider than a value with a verdict.
     """
@@ -69,7 +70,7 @@ def find_dead_time(
         found = [one for spans in held if (one := balance_held(spans)) is not None]
     times = [one.compute_dead_time() for one in found]
     dead, std = min(times, key=lambda one: one[1], default=(0.0, np.inf))
-    return dead if Z95 * std < 4.0 * VERDICT.delay_identified else None
+    return (dead, std) if Z95 * std < 4.0 * VERDICT.delay_identified else None
 
 
 _ALL = (ENGINE, VEHICLE, MASS, LOAD, DEAD_TIME)
