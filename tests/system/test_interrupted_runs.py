@@ -20,7 +20,7 @@ from drivetwin.simulation.element_schema import as_json
 from drivetwin.simulation.network import Keep, Sine, Start, simulate
 from drivetwin.simulation.network_response import to_core_scenarios
 from drivetwin.simulation.network_sensitivity import differentiate
-from tests.simulation.test_batch import (
+from tests.simulation.test_network_batch_request import (
     ELEMENTS,
     ETA,
     MANY,

@@ -51,7 +51,7 @@ from drivetwin.errors import (
 )
 from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.formats.detect import name_project_mapping, open_as_mapped, open_recording
-from drivetwin.logs.quality.channel_checks import Checked, check_channel
+from drivetwin.logs.quality.channel_checks import check_channel
 from drivetwin.logs.quality.consistency_checks import (
     check_common_span,
     check_coverage,
@@ -183,15 +183,15 @@ def assemble_log(
         notify_progress(count / len(mapped.channels))
         try:
             raw = recording.load(_load_column(recording, spec), window)
-            checked = _make_checked_channel(role, spec, raw, source, get_quantity(role))
+            channel, found = _make_checked_channel(role, spec, raw, source, get_quantity(role))
         except (UnitError, TimeError, DamagedChannelError, PlausibilityError) as fault:
             if role in strict:
                 raise
             findings.append(_report_left_out(spec.source, fault))
             continue
-        channels[role] = checked.channel
+        channels[role] = channel
         used[role] = RememberedChannel(spec, raw.unit)
-        findings += checked.findings
+        findings += found
     gearing = card if demands.gearing else None
     channels, dropped = _drop_inconsistent(channels, strict, gearing, source)
     extras = {role: one for role, one in channels.items() if is_extra(role)}
@@ -404,9 +404,10 @@ def read_channels(
         for count, (name, spec) in enumerate(specs.items()):
             notify_progress(count / len(specs))
             raw = recording.load(_load_column(recording, spec))
-            checked = _make_checked_channel(name, spec, raw, str(path), quantities[name])
-            channels[name] = checked.channel
-            findings += checked.findings
+            channels[name], found = _make_checked_channel(
+                name, spec, raw, str(path), quantities[name]
+            )
+            findings += found
     return channels, tuple(dict.fromkeys(findings))
 
 
@@ -425,7 +426,7 @@ def _require_columns(recording: Recording, specs: Mapping[str, ChannelSpec], fil
 
 def _make_checked_channel(
     role: str, spec: ChannelSpec, raw: RawChannel, file: str, quantity: Quantity
-) -> Checked:
+) -> tuple[Channel, list[Finding]]:
     """Return the checked channel of a role, and its findings."""
     place = Where(channel=raw.name)
     notes = [report(Code.RECORDING, "", place, text=note) for note in raw.notes]
@@ -444,10 +445,10 @@ def _make_checked_channel(
     filling = None if computed else raw.filling
     measured = None if filling is None else conversion.convert_filling(filling)
     channel, filled = replace_filling(channel, measured)
-    found = check_channel(channel, file)
-    held = channel.filling is None and found.channel.raster is not None
-    findings = (*notes, *_check_unit_override(spec, raw), *filled, *found.findings)
-    return Checked(replace(found.channel, held=held), findings)
+    checked, found = check_channel(channel, file)
+    held = channel.filling is None and checked.raster is not None
+    findings = [*notes, *_check_unit_override(spec, raw), *filled, *found]
+    return replace(checked, held=held), findings
 
 
 def _check_unit_override(spec: ChannelSpec, raw: RawChannel) -> list[Finding]:

@@ -3,84 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-
-_GOLDEN = 0.5 * (3.0 - float(np.sqrt(5.0)))
-_ROUND_OFF = float(np.sqrt(2.2e-16))
-_MOST = 500
-"""Largest number of evaluations."""
-
-
-def minimize_bounded(
-    function: Callable[[float], float], bounds: tuple[float, float], tolerance: float
-) -> float:
-    """Return a local minimum of `function` within `bounds`, to about `tolerance`.
-
-    Steps go to the vertex of the parabola through the three best places, or by golden section.
-
-    References
-    ----------
-    R. P. Brent, Algorithms for Minimization without Derivatives, 1973, chapter 5.
-    G. E. Forsythe, M. A. Malcolm, C. B. Moler, Computer Methods for Mathematical Computations,
-    1977, `fmin`.
-    """
-    low, high = bounds
-    start = low + _GOLDEN * (high - low)
-    # The best place, the second best and the one that was second best before.
-    best = second = third = (start, function(start))
-    step = previous = 0.0
-    for _ in range(_MOST):
-        here, middle = best[0], 0.5 * (low + high)
-        least = _ROUND_OFF * abs(here) + tolerance / 3.0
-        if abs(here - middle) <= 2.0 * least - 0.5 * (high - low):
-            break
-        vertex = None
-        if abs(previous) > least:
-            vertex = _find_vertex(best, second, third, previous)
-        if vertex is not None and low < here + vertex < high:
-            previous, step = step, vertex
-            if min(here + step - low, high - here - step) < 2.0 * least:
-                step = least if middle >= here else -least
-        else:
-            previous = (low if here >= middle else high) - here
-            step = _GOLDEN * previous
-        place = here + (max(step, least) if step >= 0.0 else min(step, -least))
-        found = (place, function(place))
-        if found[1] <= best[1]:
-            low, high = (here, high) if place >= here else (low, here)
-            best, second, third = found, best, second
-            continue
-        low, high = (place, high) if place < here else (low, place)
-        if found[1] <= second[1] or second[0] == here:
-            second, third = found, second
-        elif found[1] <= third[1] or third[0] in (here, second[0]):
-            third = found
-    return best[0]
-
-
-def _find_vertex(
-    best: tuple[float, float],
-    second: tuple[float, float],
-    third: tuple[float, float],
-    previous: float,
-) -> float | None:
-    """Step from `best` to the vertex of the parabola through three places (x, y).
-
-    None if it exceeds half of the step before the last one, `previous`.
-    """
-    r = (best[0] - second[0]) * (best[1] - third[1])
-    q = (best[0] - third[0]) * (best[1] - second[1])
-    p = (best[0] - third[0]) * q - (best[0] - second[0]) * r
-    q = 2.0 * (q - r)
-    p, q = (-p, q) if q > 0.0 else (p, -q)
-    return p / q if abs(p) < abs(0.5 * q * previous) else None
-
 
 _GRID = 80
 """Hinges compared before the best one is refined."""
@@ -242,6 +170,8 @@ def _fit_curve(
     curves: _Curves, search: _Search, powers: tuple[int, ...], floor: float
 ) -> _Fit | None:
     """Fit the hinge of one set of powers: best of a grid, then refined between its neighbours."""
+    from scipy.optimize import minimize_scalar
+
     time, side = curves.time, curves.side
     samples, unknowns = len(time), len(powers) + 2
     if samples <= unknowns:
@@ -257,7 +187,13 @@ def _fit_curve(
     if not np.isfinite(costs[best]):
         return None
     bracket = (search.grid[max(best - 1, 0)], search.grid[min(best + 1, _GRID - 1)])
-    hinge = minimize_bounded(lambda h: solve(h)[1], bracket, 1e-3 * _RESOLUTION)
+    found = minimize_scalar(
+        lambda h: solve(h)[1],
+        bounds=bracket,
+        method="bounded",
+        options={"xatol": 1e-3 * _RESOLUTION},
+    )
+    hinge = float(found.x)
     coefficients, misfit = solve(hinge)
     if misfit > costs[best] or coefficients[1] * search.direction <= 0.0:
         hinge = float(search.grid[best])

@@ -34,6 +34,7 @@ class Checked:
 def check(role: str, values: FloatArray, unit: str = "", time: FloatArray | None = None) -> Checked:
     """Check `values` in SI, whose file states `unit`; 100 Hz by default."""
     time = np.round(np.arange(values.size) * 0.01, 2) if time is None else time
-    done = check_channel(Channel(role, get_quantity(role), time, values, "X", unit), "log.csv")
-    check_jumps(done.channel, {}, "log.csv")
-    return Checked(done.channel, tuple(done.findings), time)
+    measured = Channel(role, get_quantity(role), time, values, "X", unit)
+    channel, findings = check_channel(measured, "log.csv")
+    check_jumps(channel, {}, "log.csv")
+    return Checked(channel, tuple(findings), time)

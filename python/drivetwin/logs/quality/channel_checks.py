@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,16 +116,8 @@ _MUST_VARY = frozenset(
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Checked:
-    """A channel that passed, and what was left out of it."""
-
-    channel: Channel
-    findings: tuple[Finding, ...] = ()
-
-
-def check_channel(channel: Channel, file: str) -> Checked:
-    """Return the channel fit for use: damaged samples are left out, never replaced, and listed.
+def check_channel(channel: Channel, file: str) -> tuple[Channel, list[Finding]]:
+    """Return the channel fit for use, and findings on its damaged samples, which are left out.
 
     Raises TimeError, DamagedChannelError, PlausibilityError where nothing sound would remain or the
     whole channel is in doubt.
@@ -142,25 +135,17 @@ def check_channel(channel: Channel, file: str) -> Checked:
     channel = _drop_damage(channel, found, findings)
     _check_count(channel, total, where)
     _check_variation(channel, where)
-    for look in (
-        _check_dropouts,
-        _check_spikes,
-        _check_stuck,
-        _check_outliers,
-        _check_glitches,
-        _check_clipping,
-        _check_stale,
-        find_lost_messages,
-    ):
-        channel = _drop_damage(channel, look(channel), findings)
-        _check_count(channel, total, where)
+    for applies, look in _LOOKS:
+        if applies(channel):
+            channel = _drop_damage(channel, look(channel), findings)
+            _check_count(channel, total, where)
     _check_magnitude(channel, where)
     _check_sign(channel, where)
     _check_wraps(channel, where)
     findings += _check_limit(channel)
     findings += _check_rest(channel)
     findings += _check_rounding(channel)
-    return Checked(channel, tuple(findings))
+    return channel, findings
 
 
 def _check_gaps(channel: Channel) -> list[Finding]:
@@ -227,45 +212,7 @@ def _is_binary(values: FloatArray) -> bool:
     return all(bool(np.all((one == low) | (one == high))) for one in (values[:SOME], values))
 
 
-def _check_dropouts(channel: Channel) -> Damage | None:
-    if channel.quantity not in (Quantity.SPEED, Quantity.TORQUE):
-        return None
-    return _check_updates(channel, lambda fresh: find_dropouts(fresh.time, fresh.values))
-
-
-def _check_spikes(channel: Channel) -> Damage | None:
-    return find_spikes(channel.time, channel.values, channel.quantity)
-
-
-def _check_glitches(channel: Channel) -> Damage | None:
-    """Find glitches of a measured torque. Engine torque is excluded: short cuts may be genuine."""
-    if channel.role != "output_torque":
-        return None
-    return _check_updates(channel, lambda fresh: find_glitches(fresh.time, fresh.values))
-
-
-def _check_stuck(channel: Channel) -> Damage | None:
-    """Stretches of one number; of an engine torque that a logger holds, in its fresh values."""
-    if channel.role == "engine_torque":
-        return _check_updates(
-            channel, lambda fresh: find_stuck(fresh.time, fresh.values, fresh.quantity)
-        )
-    return (
-        find_stuck(channel.time, channel.values, channel.quantity)
-        if _has_sensor_noise(channel)
-        else None
-    )
-
-
-def _check_outliers(channel: Channel) -> Damage | None:
-    """Invalid-value codes; a pressure within the plausible range may be the pulse of a valve."""
-    if channel.quantity in AUXILIARY:
-        return None
-    possible = _PLAUSIBLE[Quantity.PRESSURE][1] if channel.quantity is Quantity.PRESSURE else 0.0
-    return _check_updates(channel, lambda fresh: find_outliers(fresh.time, fresh.values, possible))
-
-
-def _check_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -> Damage | None:
+def _look_at_updates(look: Look, channel: Channel) -> Damage | None:
     """Apply `look` to the updated samples of a channel; include the samples that repeat them."""
     fresh = channel.fresh
     found = look(fresh)
@@ -275,20 +222,41 @@ def _check_updates(channel: Channel, look: Callable[[Channel], Damage | None]) -
     return Damage(found.mask[np.clip(update, 0, None)], found.code)
 
 
-def _check_stale(channel: Channel) -> Damage | None:
-    """Find values that a logger repeats while messages are lost."""
-    if channel.quantity in AUXILIARY:
-        return None
-    return _check_updates(channel, lambda fresh: find_stale(fresh.values))
-
-
-def _check_clipping(channel: Channel) -> Damage | None:
-    return find_clipping(channel.values) if _has_sensor_noise(channel) else None
-
-
 def _has_sensor_noise(channel: Channel) -> bool:
     """Return True if a channel is expected to have sensor noise."""
     return channel.role in _MUST_VARY or channel.quantity is Quantity.PRESSURE
+
+
+def _find_codes(channel: Channel) -> Damage | None:
+    """Find invalid-value codes; a plausible pressure may be the pulse of a valve."""
+    possible = _PLAUSIBLE[Quantity.PRESSURE][1] if channel.quantity is Quantity.PRESSURE else 0.0
+    return find_outliers(channel.time, channel.values, possible)
+
+
+Look = Callable[[Channel], Damage | None]
+
+_LOOKS: tuple[tuple[Callable[[Channel], bool], Look], ...] = (
+    (
+        lambda one: one.quantity in (Quantity.SPEED, Quantity.TORQUE),
+        partial(_look_at_updates, lambda fresh: find_dropouts(fresh.time, fresh.values)),
+    ),
+    (lambda _: True, lambda one: find_spikes(one.time, one.values, one.quantity)),
+    (lambda one: one.role == "engine_torque", partial(_look_at_updates, find_stuck)),
+    (_has_sensor_noise, find_stuck),
+    (lambda one: one.quantity not in AUXILIARY, partial(_look_at_updates, _find_codes)),
+    # Short cuts of an engine torque may be genuine.
+    (
+        lambda one: one.role == "output_torque",
+        partial(_look_at_updates, lambda fresh: find_glitches(fresh.time, fresh.values)),
+    ),
+    (_has_sensor_noise, lambda one: find_clipping(one.values)),
+    (
+        lambda one: one.quantity not in AUXILIARY,
+        partial(_look_at_updates, lambda fresh: find_stale(fresh.values)),
+    ),
+    (lambda _: True, find_lost_messages),
+)
+"""Searches for damaged samples in their order, with the channels that each applies to."""
 
 
 def _drop_damage(

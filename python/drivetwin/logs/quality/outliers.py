@@ -22,7 +22,7 @@ from drivetwin._util.arrays import (
     sample_blocks,
 )
 from drivetwin.channels.roles import Quantity
-from drivetwin.channels.shiftlog import FloatArray
+from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.errors import Where
 from drivetwin.findings import Code, Finding, report
 
@@ -256,13 +256,14 @@ def find_glitches(time: FloatArray, values: FloatArray) -> Damage | None:
     return _make_damage(mask, Code.GLITCHES)
 
 
-def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Damage | None:
+def find_stuck(channel: Channel) -> Damage | None:
     """Stretches in which a varying signal repeats one number as it never does elsewhere.
 
     Noise stops at the start or comes back at the end, or it is a speed, which cannot jump, and
     jumps at the end. Standstill is none, nor a signal without noise that comes to rest or starts
     from rest by itself.
     """
+    time, values = channel.time, channel.values
     same = values[1:] == values[:-1]
     changes = same.size - int(np.count_nonzero(same))
     usual = compute_usual_step(values) if changes else np.inf
@@ -274,7 +275,7 @@ def find_stuck(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dama
     for start, end in long:
         if values[start] == 0.0:
             continue
-        slow = quantity is Quantity.SPEED and time[end] - time[start] >= _STUCK_TIME
+        slow = channel.quantity is Quantity.SPEED and time[end] - time[start] >= _STUCK_TIME
         released = end < same.size and abs(values[end + 1] - values[end]) > least
         before, after = values[max(0, start - _BEFORE) : start + 1], values[end:][: _BEFORE + 1]
         beside = (np.diff(before), np.diff(after))
