@@ -91,7 +91,24 @@ WITH_VARIANTS = """<MSRSW><SHORT-NAME>d</SHORT-NAME><CATEGORY>CDF20</CATEGORY><S
 <V>3</V><V>4</V></SW-VALUES-PHYS></SW-VALUE-CONT><SW-AXIS-CONTS><SW-AXIS-CONT>
 <CATEGORY>COM_AXIS</CATEGORY><SW-INSTANCE-REF>X</SW-INSTANCE-REF></SW-AXIS-CONT></SW-AXIS-CONTS>
 </SW-INSTANCE>
+<SW-INSTANCE><SHORT-NAME>D</SHORT-NAME><CATEGORY>CURVE</CATEGORY><SW-VALUE-CONT><SW-VALUES-PHYS>
+<V>3</V><V>4</V></SW-VALUES-PHYS></SW-VALUE-CONT><SW-AXIS-CONTS><SW-AXIS-CONT>
+<CATEGORY>COM_AXIS</CATEGORY><SW-INSTANCE-REF>Y</SW-INSTANCE-REF></SW-AXIS-CONT></SW-AXIS-CONTS>
+</SW-INSTANCE>
+<SW-INSTANCE><SHORT-NAME>Y</SHORT-NAME><CATEGORY>COM_AXIS</CATEGORY><SW-VALUE-CONT>
+<UNIT-DISPLAY-NAME>rpm</UNIT-DISPLAY-NAME><SW-VALUES-PHYS><V>1</V><V>2.5</V></SW-VALUES-PHYS>
+</SW-VALUE-CONT></SW-INSTANCE>
 </SW-INSTANCE-TREE></SW-INSTANCE-SPEC></SW-SYSTEM></SW-SYSTEMS></MSRSW>"""
+
+
+def test_curves_of_one_axis_refer_to_it() -> None:
+    speeds = Axis("engine_speed", (100.0, 200.0), "rad/s")
+    both = tuple(Curve(name, speeds, (1.0, 2.0), "s", "ramp") for name in "ab")
+    content = ParameterSet("map", (), (*both, *CONTENT.curves))
+    text = format_parameters(content, ParameterFormat.CDFX)
+    assert text.count("<SHORT-NAME>engine_speed_axis_1</SHORT-NAME>") == text.count("100.0") == 1
+    assert text.count("<SW-INSTANCE-REF>engine_speed_axis_1</SW-INSTANCE-REF>") == 2
+    assert parse_parameters(text, ParameterFormat.CDFX, "map.cdfx") == content
 
 
 _CDF_CHILDREN = {
@@ -106,7 +123,9 @@ _CDF_CHILDREN = {
     ],
     "SW-VALUE-CONT": ["UNIT-DISPLAY-NAME", "SW-ARRAYSIZE", "SW-VALUES-PHYS"],
     "SW-AXIS-CONTS": ["SW-AXIS-CONT"],
-    "SW-AXIS-CONT": ["CATEGORY", "UNIT-DISPLAY-NAME", "SW-ARRAYSIZE", "SW-VALUES-PHYS"],
+    "SW-AXIS-CONT": [
+        *("CATEGORY", "UNIT-DISPLAY-NAME", "SW-ARRAYSIZE", "SW-VALUES-PHYS", "SW-INSTANCE-REF")
+    ],
     "SW-VALUES-PHYS": ["V"],
 }
 """Children in the order of the ASAM DTD, as far as used; the DTD itself may not be passed on."""
@@ -121,7 +140,7 @@ def test_the_text_is_that_of_the_example() -> None:
 def test_variants_are_read_and_other_objects_are_named() -> None:
     found = parse_parameters(WITH_VARIANTS, ParameterFormat.CDFX, "demo.cdfx")
     assert found.scalars == (Scalar("A", 12.5, "Nm"),)
-    assert found.curves == ()
+    assert found.curves == (Curve("D", Axis("x", (1.0, 2.5), "rpm"), (3.0, 4.0)),)
     assert found.skipped == ("VAL_BLK B", "CURVE C")
     assert found.name == "demo"
 

@@ -7,6 +7,7 @@ import math
 import re
 import unicodedata
 import xml.etree.ElementTree as ET
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -308,6 +309,12 @@ class ParameterSet:
     def entries(self) -> tuple[Scalar | Curve, ...]:
         """Numbers, then curves."""
         return (*self.scalars, *self.curves)
+
+    def name_common_axes(self) -> dict[Axis, str]:
+        """Name the axes that several curves share."""
+        counts = Counter(one.axis for one in self.curves)
+        shared = [axis for axis, count in counts.items() if count > 1]
+        return {axis: f"{axis.name}_axis_{k + 1}" for k, axis in enumerate(shared)}
 
 
 E = TypeVar("E", Scalar, Curve)

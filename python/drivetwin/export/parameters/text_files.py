@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import csv
 import re
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import groupby, takewhile
@@ -231,7 +230,7 @@ def _write_dcm(content: ParameterSet) -> str:
             f"  WERT {format_number(scalar.value)}",
         ]
         lines += ["END", ""]
-    common = _name_common_axes(content)
+    common = content.name_common_axes()
     for axis, name in common.items():
         lines += [f"STUETZSTELLENVERTEILUNG {name} {len(axis.points)}", f"  FUNKTION {function}"]
         lines += [f'  EINHEIT_X "{to_tool_unit(axis.unit)}"', *_format_list("ST/X", axis.points)]
@@ -251,13 +250,6 @@ def _write_dcm(content: ParameterSet) -> str:
             "",
         ]
     return "\n".join(lines)
-
-
-def _name_common_axes(content: ParameterSet) -> dict[Axis, str]:
-    """Name the axes that several curves share."""
-    counts = Counter(one.axis for one in content.curves)
-    shared = [axis for axis, count in counts.items() if count > 1]
-    return {axis: f"{axis.name}_axis_{k + 1}" for k, axis in enumerate(shared)}
 
 
 def _format_head(entry: Scalar | Curve, function: str) -> list[str]:

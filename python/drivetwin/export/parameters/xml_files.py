@@ -2,9 +2,9 @@
 """Parameters as XML: ASAM CDF 2.0 (.cdfx) and system structure parameter values (SSP 1.0, .ssv).
 
 CANape, INCA and MATLAB read CDF: a number is a SW-INSTANCE of category VALUE; a curve is a CURVE
-with a STD_AXIS of its own. FMPy, OMSimulator and Dymola read SSV, which supports scalars only: a
-curve `mu.B3` over `slip` is written as `mu.B3[1]`, `mu.B3[2]` … and `mu.B3.slip[1]`,
-`mu.B3.slip[2]` …, in the structured naming of FMI.
+with a STD_AXIS of its own, or the COM_AXIS of several. FMPy, OMSimulator and Dymola read SSV, which
+supports scalars only: a curve `mu.B3` over `slip` is written as `mu.B3[1]`, `mu.B3[2]` … and
+`mu.B3.slip[1]`, `mu.B3.slip[2]` …, in the structured naming of FMI.
 """
 
 from __future__ import annotations
@@ -42,6 +42,8 @@ _DOCTYPE = (
     '//EN" "cdf_v2.0.0.sl.dtd">'
 )
 
+_COMMON = "COM_AXIS"
+
 
 def _write_cdfx(content: ParameterSet) -> str:
     root = ET.Element("MSRSW", CREATOR="drivetwin")
@@ -56,13 +58,21 @@ def _write_cdfx(content: ParameterSet) -> str:
     for scalar in content.scalars:
         instance = _add_instance(tree, scalar.name, scalar.text, "VALUE")
         _add_values(add_child(instance, "SW-VALUE-CONT"), scalar.unit, (scalar.value,))
+    common = content.name_common_axes()
+    for points, name in common.items():
+        instance = _add_instance(tree, name, points.name, _COMMON)
+        _add_values(add_child(instance, "SW-VALUE-CONT"), points.unit, points.points)
     for curve in content.curves:
         text = append_axis(curve.text, curve.axis.name)
         instance = _add_instance(tree, curve.name, text, "CURVE")
         _add_values(add_child(instance, "SW-VALUE-CONT"), curve.unit, curve.values)
         axis = add_child(add_child(instance, "SW-AXIS-CONTS"), "SW-AXIS-CONT")
-        add_child(axis, "CATEGORY", "STD_AXIS")
-        _add_values(axis, curve.axis.unit, curve.axis.points)
+        if curve.axis in common:
+            add_child(axis, "CATEGORY", _COMMON)
+            add_child(axis, "SW-INSTANCE-REF", common[curve.axis])
+        else:
+            add_child(axis, "CATEGORY", "STD_AXIS")
+            _add_values(axis, curve.axis.unit, curve.axis.points)
     return format_document(root, _DOCTYPE, format_comment(content.notes))
 
 
@@ -93,20 +103,30 @@ def _parse_cdfx(text: str, source: str) -> ParameterSet:
             "no SW-SYSTEM below MSRSW", "hand in an ASAM CDF 2.0 file", Where(file=source)
         )
     scalars, curves, skipped = [], [], []
-    for instance in system.iter("SW-INSTANCE"):
+    found = [(one, _find_holder(one)) for one in system.iter("SW-INSTANCE")]
+    common = {
+        get_text(one, "SHORT-NAME"): holder.find("SW-VALUE-CONT")
+        for one, holder in found
+        if get_text(one, "CATEGORY") == _COMMON
+    }
+    for instance, holder in found:
         name, category = get_text(instance, "SHORT-NAME"), get_text(instance, "CATEGORY")
-        # With variants the values stand one level deeper; without a choice the first holds.
-        holder = instance.find("SW-INSTANCE-PROPS-VARIANTS/SW-INSTANCE-PROPS-VARIANT")
-        holder = instance if holder is None else holder
         axis = holder.find("SW-AXIS-CONTS/SW-AXIS-CONT")
+        axis = None if axis is None else common.get(get_text(axis, "SW-INSTANCE-REF"), axis)
         if category == "VALUE" and holder.find("SW-VALUE-CONT/SW-VALUES-PHYS/V") is not None:
             scalars.append(_parse_instance(name, instance, holder, source))
         elif category == "CURVE" and axis is not None and axis.find("SW-VALUES-PHYS/V") is not None:
             curves.append(_parse_instance_curve(name, (instance, holder, axis), source))
-        else:
+        elif category != _COMMON:  # read with the curves that refer to it
             skipped.append(f"{category} {name}")
     title = get_text(system, "LONG-NAME") or Path(source).stem
     return ParameterSet(title, tuple(scalars), tuple(curves), skipped=tuple(skipped))
+
+
+def _find_holder(instance: ET.Element) -> ET.Element:
+    """Return what holds the values: of variants the first, as no choice is stated."""
+    variant = instance.find("SW-INSTANCE-PROPS-VARIANTS/SW-INSTANCE-PROPS-VARIANT")
+    return instance if variant is None else variant
 
 
 def _parse_instance(name: str, instance: ET.Element, holder: ET.Element, source: str) -> Scalar:
