@@ -31,14 +31,13 @@ from drivetwin.calibration.operating_map import Grid, calibrate_map, trace_front
 from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.cli.identify import load_identified_card, read_shifts
-from drivetwin.cli.output import Remaining
 from drivetwin.cli.requests.identification import IdentifyOptions
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.estimation.analysis.experiment_design import rank_experiments
 from drivetwin.estimation.result.method import Method
-from drivetwin.report.html import build_joint_page, build_report_page, render_page
+from drivetwin.report.html import build_report_page, render_page
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import (
     JointIdentification,
@@ -63,6 +62,8 @@ SCENARIOS = (
     "manual",
 )
 """Scenarios of the virtual dynamometer that are identified by each method."""
+EARLY = 0.05
+"""Share done below which the time left is a guess."""
 OPEN = "paper"
 """Scenario that leaves a parameter open, so that experiments are compared."""
 
@@ -83,15 +84,10 @@ class Timeline:
         return float(max(np.max(np.abs(self.shares - gone)), np.max(np.abs(shown - gone))))
 
     def compute_time_left(self, seconds: float) -> float | None:
-        """Compute the time left [s] that the terminal shows so late; None if it shows none."""
-        now = 0.0
-        line = Remaining("", lambda: now)
-        for now, share in zip(self.seconds.tolist(), self.shares.tolist(), strict=True):
-            if now > seconds:
-                break
-            line.update(share, "")
-        now = seconds
-        return line.estimate_time_left()
+        """Compute the time left [s] by the share shown so late; None for a small share."""
+        share = float(self.shares[np.searchsorted(self.seconds, seconds, side="right") - 1])
+        is_early = seconds < self.seconds[0] or share < EARLY
+        return None if is_early else seconds * (1.0 - share) / share
 
     def count_right(self, factor: float = 2.0) -> tuple[float, float]:
         """Return the shares of the time with a time left, and with one right within `factor`.
@@ -128,7 +124,7 @@ class Bench:
 
     def render(self, model: ValidatedModel) -> str:
         """Render the report of the log."""
-        return render_page(build_report_page(model.result, self.source.log))
+        return render_page(build_report_page(model.result, [self.source.log]))
 
     def identify(self, method: Method) -> ValidatedModel:
         """Identify the log and simulate its shifts, as the command `identify` does."""
@@ -168,7 +164,7 @@ def run_joint(folder: Path) -> Iterator[tuple[str, Timeline]]:
     sources, card = [one.source for one in benches], benches[0].card
     join = partial(_collect, joined, partial(identify_together, sources, card))
     yield "several logs", record_timeline(join)
-    page = partial(lambda made: render_page(build_joint_page(made.found, made.fitted)), joined[0])
+    page = partial(lambda made: render_page(build_report_page(made.found, made.fitted)), joined[0])
     yield "report of several logs", record_timeline(page)
     bench = make_bench(folder, OPEN)
     task = Task([bench.source], bench.card)

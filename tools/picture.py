@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from drivetwin.cli.identify import IdentifiedLog, run_identification
+from drivetwin.cli.identify import run_identification
 from drivetwin.cli.requests.identification import IdentifyOptions
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run as run_dyno
@@ -25,6 +25,7 @@ from drivetwin.fit.read import read_recording
 from drivetwin.fit.synthesize import ModelName, read_builtin, synthesize_log
 from drivetwin.report.fit import build_fit_page
 from drivetwin.report.html import render_page, save_report
+from drivetwin.validation.validated_model import JointIdentification
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "img"
 WIDTH, HEIGHT = 1000, 960
@@ -36,16 +37,16 @@ OPTIONS = (
 )
 
 
-def identify_demo(folder: Path) -> IdentifiedLog:
+def identify_demo(folder: Path) -> JointIdentification:
     """Write the log of the demo into `folder` and identify it."""
     log, card, _ = write_run(folder / "shift.csv", run_dyno(load_scenario("paper_steps"), seed=0))
-    return run_identification(log, IdentifyOptions(vehicle=card, method=DEFAULT_METHOD))
+    return run_identification([log], IdentifyOptions(vehicle=card, method=DEFAULT_METHOD))
 
 
-def write_report(outcome: IdentifiedLog, folder: Path) -> Path:
+def write_report(outcome: JointIdentification, folder: Path) -> Path:
     """Write the report."""
     path = folder / "report.html"
-    save_report(path, outcome.found, outcome.log)
+    save_report(path, outcome.found, outcome.fitted[0])
     return path
 
 

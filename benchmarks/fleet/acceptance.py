@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from drivetwin.cli.fleet import show_progress
+from drivetwin.cli.fleet import RunProgress
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
 from drivetwin.fleet.mixed_model.estimate import estimate_fleet
 from drivetwin.fleet.mixed_model.mixed import Interval, JointEstimate
@@ -44,14 +44,14 @@ def run_made_fleet(folder: Path, store: Path) -> dict[str, Settled]:
         quick=True,
     )
     started = perf_counter()
-    with show_progress(as_json=False) as show:
+    progress = RunProgress()
 
-        def hear(event: Event) -> None:
-            show(event)
-            if isinstance(event, Settled):
-                settled[Path(event.path).name] = event
+    def hear(event: Event) -> None:
+        progress.handle(event)
+        if isinstance(event, Settled):
+            settled[Path(event.path).name] = event
 
-        summary = run_fleet(request, hear)
+    summary = run_fleet(request, hear)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{summary.computed} logs computed in {perf_counter() - started:.0f} s, "
           f"coordinator at most {memory:.0f} MiB")  # fmt: skip

@@ -109,7 +109,6 @@ class Code(StrEnum):
     EFFECTS_OMITTED = auto()
     OTHER_LOSS_LAW = auto()
     LIKELIHOOD_FAILED = auto()
-    PAPER_METHOD_FAILED = auto()
     PAPER_BIASED = auto()
     PAPER_POORLY_EXCITED = auto()
     CARD_CONTRADICTED = auto()

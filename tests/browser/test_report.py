@@ -134,17 +134,6 @@ def test_the_first_screen_has_verdict_plot_and_parameters(page: Page, report: Pa
         assert page.evaluate("document.documentElement.scrollWidth") == width
 
 
-def test_the_appendix_is_drawn_when_it_opens(page: Page, report: Path) -> None:
-    opened(page, report)
-    part = page.locator("#appendix-inertia")
-    assert part.locator(".main-svg").count() == 0
-    page.locator("nav a", has_text="Appendix: inertia").click()
-    part.locator(".main-svg").first.wait_for()
-    page.wait_for_function(
-        "document.querySelector('#appendix-inertia .plot .main-svg').clientWidth > 500"
-    )
-
-
 def test_paper_answers_on_its_first_page(page: Page, report: Path, pictures: Path) -> None:
     page.set_viewport_size({"width": A4_WIDTH, "height": A4_HEIGHT})
     opened(page, report)

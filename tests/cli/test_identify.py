@@ -9,6 +9,7 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -161,8 +162,8 @@ def test_strict_passes_a_confirmed_model_only(
     bench_files: Files, monkeypatch: pytest.MonkeyPatch, status: ModelStatus
 ) -> None:
     made = Outcome(document={}, is_confirmed=status.is_confirmed)
-    for name in ("identify.identify_log", "identify.identify_jointly"):
-        monkeypatch.setattr(f"drivetwin.cli.{name}", lambda *_: made)
+    monkeypatch.setattr("drivetwin.cli.identify.run_identification", MagicMock())
+    monkeypatch.setattr("drivetwin.cli.identify.build_outcome", lambda *_: made)
     arguments = ["identify", str(bench_files.log), "--vehicle", str(bench_files.card)]
     expected = 0 if status in (ModelStatus.VALID, ModelStatus.LIMITED) else 3
     assert main([*arguments, "--strict"]) == expected

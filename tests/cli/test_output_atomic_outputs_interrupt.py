@@ -29,7 +29,7 @@ def test_while_the_last_file_is_written_keeps_the_old_ones(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("drivetwin.report.html.build_report_page", stop)
+    monkeypatch.setattr("drivetwin.cli.identify.build_report_page", stop)
     assert main([*identify(bench_files, output), "--method", "paper"]) == 130
     assert [path.name for path in tmp_path.rglob("*")] == ["out", "result.json"]
     assert (output / "result.json").read_text() == "old"

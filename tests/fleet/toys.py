@@ -74,10 +74,23 @@ def open_store(folder: Path) -> Any:
     return Store(folder, write=True)
 
 
+RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})
+"""Columns that describe the runs, not the logs; they differ between equal results."""
+
+
+def read_table(store: Any, name: str) -> list[dict[str, Any]]:
+    """Rows of a table of the index by its key, without the columns on runs."""
+    columns, rows = store.index.fetch_table(f"SELECT * FROM {name} ORDER BY 1, 2")
+    pairs = (zip(columns, row, strict=True) for row in rows)
+    return [{key: one for key, one in row if key not in RUN_COLUMNS} for row in pairs]
+
+
 def contents(store: Path) -> dict[str, Any]:
     """All that a store holds of its logs: every table but what tells of the runs, every row."""
     with Store(store) as opened:
-        tables = {name: opened.read_table(name) for name in ("settings", "files", "logs", "shifts")}
+        tables = {
+            name: read_table(opened, name) for name in ("settings", "files", "logs", "shifts")
+        }
         return {**tables, "rows": opened.read_rows().to_pylist()}
 
 

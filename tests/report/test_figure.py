@@ -10,18 +10,17 @@ from drivetwin.report.figure import make_subplots
 
 
 def test_panels_lie_where_plotly_puts_them() -> None:
-    ours = make_subplots([0.64, 0.36], [0.62, 0.38], gaps=(0.12, 0.2), tall=[(1, 2)])
+    ours = make_subplots([0.64, 0.36], [0.62, 0.38], gaps=(0.12, 0.2))
     theirs = subplots.make_subplots(
         rows=2,
         cols=2,
-        specs=[[{}, {"rowspan": 2}], [{}, None]],
         column_widths=[0.64, 0.36],
         row_heights=[0.62, 0.38],
         horizontal_spacing=0.12,
         vertical_spacing=0.2,
     )
     axes = [name for name in ours.layout if name.startswith(("xaxis", "yaxis"))]
-    assert len(axes) == 6
+    assert len(axes) == 8
     for name in axes:
         assert ours.layout[name].domain == pytest.approx(theirs.layout[name].domain)
         assert ours.layout[name].anchor == theirs.layout[name].anchor

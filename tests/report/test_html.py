@@ -26,7 +26,7 @@ def found() -> Identification:
 
 @pytest.fixture(scope="module")
 def page(found: Identification) -> str:
-    return render_page(build_report_page(found, log()))
+    return render_page(build_report_page(found, [log()]))
 
 
 def test_opens_offline(page: str) -> None:
@@ -91,7 +91,7 @@ def test_plotly_knows_every_entry_of_the_figures(found: Identification) -> None:
 
 
 def test_equal_inputs_give_equal_text(page: str, found: Identification) -> None:
-    assert render_page(build_report_page(found, log())) == page
+    assert render_page(build_report_page(found, [log()])) == page
 
 
 def test_stays_small_for_long_logs(found: Identification, tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_sparse_identification_leaves_sections_out(found: Identification) -> Non
         found, estimates={}, friction={}, fit={}, correlation=None, findings=(),
         evidence=replace(found.evidence, validation=()),
     )  # fmt: skip
-    page = render_page(build_report_page(sparse, log()))
+    page = render_page(build_report_page(sparse, [log()]))
     assert page.startswith("<!DOCTYPE html>")
     assert 'id="friction"' not in page
     assert 'id="validation"' not in page

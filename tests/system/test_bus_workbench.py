@@ -34,7 +34,7 @@ def identified(folder: Path) -> Iterator[Any]:
     one.open(one.get_folder_source(first), one.get_folder_source(RATIOS))
     for name in others:
         one.add_log(one.get_folder_source(name))
-    one.hold_out([frozenset(), frozenset(), frozenset({0})])
+    one.update(lambda work: work.hold_out([frozenset(), frozenset(), frozenset({0})]))
     assert _list_states(one.work)["IDENTIFY"] == "NEXT"
     one.identify()
     finish(one)

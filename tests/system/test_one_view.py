@@ -17,8 +17,12 @@ from drivetwin.fit.synthesize import ModelName
 from drivetwin.gearbox import load_gearbox
 from drivetwin.report.drive import build_drive_page, build_energy_table, build_shift_table
 from drivetwin.report.fit import build_fit_blocks, build_fit_page
-from drivetwin.report.html import build_joint_page, build_report_page, render_fragment, render_page
-from drivetwin.report.notebook import build_identification_blocks
+from drivetwin.report.html import (
+    build_identification_blocks,
+    build_report_page,
+    render_fragment,
+    render_page,
+)
 from drivetwin.report.text import format_blocks
 from drivetwin.validation.simulate_log import attach_fit
 from drivetwin.workbench.views.widgets import render_block
@@ -35,14 +39,14 @@ Shown = tuple[Sequence[Any], str]
 def identify() -> Shown:
     """One log."""
     found = attach_fit(identification(), [validation()])
-    return build_identification_blocks(found), render_page(build_report_page(found, log()))
+    return build_identification_blocks(found), render_page(build_report_page(found, [log()]))
 
 
 def identify_jointly() -> Shown:
     """Two logs, and a shift that is predicted."""
     made = together()
     return build_identification_blocks(made.found), render_page(
-        build_joint_page(made.found, made.fitted)
+        build_report_page(made.found, made.fitted)
     )
 
 

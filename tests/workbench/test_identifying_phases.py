@@ -21,14 +21,14 @@ def shift(identified: Any) -> Any:
 
 
 def _move(session: Any, changes: dict[Boundary, float]) -> Any:
-    session.move_boundaries(0, changes)
+    session.update(lambda work: work.apply_moves(0, changes))
     return session.work.shifts[0]
 
 
 @pytest.fixture(autouse=True)
 def _go_back(identified: Any) -> Iterator[None]:
     yield
-    identified.move_boundaries(0, {})
+    identified.update(lambda work: work.apply_moves(0, {}))
 
 
 def test_a_moved_boundary_moves_both_phases_it_parts(identified: Any, shift: Any) -> None:

@@ -29,8 +29,8 @@ def test_locks_and_phases_reach_the_identification(session: Any) -> None:
     _open(session)
     shift = session.work.require_shift()
     time = shift.torque_phase[0] - 0.004
-    session.move_boundaries(0, {Boundary.TORQUE: time})
-    session.set_lock("k_o", Lock(LockKind.FIXED, 1.75e5))
+    session.update(lambda work: work.apply_moves(0, {Boundary.TORQUE: time}))
+    session.update(lambda work: work.set_lock("k_o", Lock(LockKind.FIXED, 1.75e5)))
     session.identify(is_quick=True)
     with pytest.raises(InputError, match="running"):
         session.identify(is_quick=True)
@@ -134,7 +134,7 @@ def test_nothing_is_done_before_a_log_is_open(session: Any) -> None:
     for action in (
         session.identify,
         lambda: session.correct_mapping([]),
-        lambda: session.move_boundaries(0, {}),
+        lambda: session.update(lambda work: work.apply_moves(0, {})),
         session.get_simulation,
         lambda: session.save("work"),
     ):
@@ -201,7 +201,7 @@ def several(session: Any, place: Path) -> Any:
 
 
 def test_a_held_out_log_is_predicted_and_has_no_twin(several: Any) -> None:
-    several.hold_out([frozenset(), frozenset({0})])
+    several.update(lambda work: work.hold_out([frozenset(), frozenset({0})]))
     several.identify(is_quick=True)
     finish(several)
     outcome = several.work.require_outcome()
@@ -209,10 +209,10 @@ def test_a_held_out_log_is_predicted_and_has_no_twin(several: Any) -> None:
     assert outcome.found is not None
     (held,) = outcome.found.evidence.held_out
     assert held.source == SECOND
-    several.select_log(1)
+    several.update(lambda work: work.select_log(1))
     with pytest.raises(InputError, match=r"no shift of second\.csv was fitted"):
         several.get_simulation()
-    several.select_log(0)
+    several.update(lambda work: work.select_log(0))
     assert several.get_simulation().present.fit
 
 
@@ -220,10 +220,10 @@ def test_several_logs_are_corrected_saved_removed_and_limited(several: Any) -> N
     first, second = several.work.logs
     assert first.corrections == second.corrections
     assert second.corrections.channels["wheel_speed"].unit == "1/min"
-    several.hold_out([frozenset(), frozenset({0})])
-    several.select_log(1)
+    several.update(lambda work: work.hold_out([frozenset(), frozenset({0})]))
+    several.update(lambda work: work.select_log(1))
     time = several.work.require_shift().torque_phase[0] - 0.004
-    several.move_boundaries(0, {Boundary.TORQUE: time})
+    several.update(lambda work: work.apply_moves(0, {Boundary.TORQUE: time}))
     assert several.work.logs[0].moves == {}
     assert several.work.build_sources()[1].shifts.shifts[0].torque_phase[0] == time
     name, before = several.save("several"), several.work
@@ -238,14 +238,14 @@ def test_several_logs_are_corrected_saved_removed_and_limited(several: Any) -> N
     none: frozenset[int] = frozenset()
     for held in ([], [none], [frozenset({3}), none]):
         with pytest.raises(InputError, match="no such shift"):
-            several.hold_out(held)
+            several.update(lambda work, held=held: work.hold_out(held))
     with pytest.raises(InputError, match="is open"):
         several.add_log(several.get_folder_source(SECOND))
     several.work = replace(after, logs=after.logs * 100)
     with pytest.raises(InputError, match="limit"):
         several.add_log(Source("other.csv", several.get_folder_source(SECOND).path))
     several.work = after
-    several.remove_log(0)
+    several.update(lambda work: work.remove_log(0))
     assert [one.source.name for one in several.work.logs] == [SECOND]
     with pytest.raises(InputError, match="no such log"):
-        several.remove_log(0)
+        several.update(lambda work: work.remove_log(0))

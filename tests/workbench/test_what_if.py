@@ -16,9 +16,9 @@ from drivetwin.workbench.what_if import simulate_identified
 @pytest.fixture
 def moved(identified: Any) -> Iterator[Any]:
     """A session whose sliders go back afterwards."""
-    identified.reset_sliders()
+    identified.update(lambda work: replace(work, changes={}))
     yield identified
-    identified.reset_sliders()
+    identified.update(lambda work: replace(work, changes={}))
 
 
 def test_at_rest_the_run_is_that_of_the_identification(moved: Any) -> None:

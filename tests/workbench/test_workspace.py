@@ -8,6 +8,7 @@ import json
 import os
 import pickle
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +24,14 @@ from tests.workbench.conftest import CARD, LOG
 def saved(identified: Any) -> Iterator[Path]:
     """A workspace with a moved boundary, a lock and a slider."""
     time = identified.work.shifts[0].inertia_phase[0] + 0.003
-    identified.move_boundaries(0, {Boundary.INERTIA: time})
-    identified.set_lock("k_o", Lock(LockKind.PRIOR, 1.7e5, 2e3))
+    identified.update(lambda work: work.apply_moves(0, {Boundary.INERTIA: time}))
+    identified.update(lambda work: work.set_lock("k_o", Lock(LockKind.PRIOR, 1.7e5, 2e3)))
     identified.apply_sliders({"k_o": 1.5e5, "mu.B3": 1.05})
     name = identified.save("test")
     yield identified.folder.root / name
-    identified.move_boundaries(0, {})
-    identified.set_lock("k_o", Lock(LockKind.FREE))
-    identified.reset_sliders()
+    identified.update(lambda work: work.apply_moves(0, {}))
+    identified.update(lambda work: work.set_lock("k_o", Lock(LockKind.FREE)))
+    identified.update(lambda work: replace(work, changes={}))
 
 
 def test_a_reopened_workspace_goes_on_where_it_was(

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Text of a vehicle card, with a comment on each number; numbers of a card changed in place."""
+"""Text of a vehicle card, with a comment on each number."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from copy import deepcopy
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 from drivetwin._util.text import escape_line
 from drivetwin._util.toml import (
@@ -38,8 +36,8 @@ from drivetwin.authoring.question import (
     list_elements,
     list_gears,
 )
-from drivetwin.authoring.stated_number import StatedNumber, parse_range, parse_stated
-from drivetwin.errors import CardError, InputError, Where
+from drivetwin.authoring.stated_number import StatedNumber
+from drivetwin.errors import CardError, Where
 from drivetwin.vehicle.card import check_card
 from drivetwin.vehicle.card_fields import get_card_field
 
@@ -85,7 +83,11 @@ def format_card(
 def refuse_faults(text: str, file: str) -> None:
     """Raise CardError where the text is no card that `load_card` reads; nothing is written yet."""
     remedy = "correct the answers or options for these entries"
-    raise_faults(check_card(parse_toml(text)), CardError, file, remedy)
+    try:
+        document = parse_toml(text)
+    except ValueError as fault:
+        raise CardError(f"no valid TOML: {fault}", "correct it", Where(file=file)) from None
+    raise_faults(check_card(document), CardError, file, remedy)
 
 
 def _format_head(answers: Answers, survey: LogSurvey | None, *, draft: bool) -> Iterator[str]:
@@ -260,105 +262,3 @@ def _format_note(answer: Answer) -> str:
     if answer.origin is Origin.GUESS:
         return f"  # guess: {escape_line(answer.note)}"
     return f"  # {escape_line(answer.note)}" if answer.note else ""
-
-
-EntryPath = tuple[str | int, ...]
-"""Place of an entry in the document, such as `("gears", 0, "ratio")`."""
-_SECTIONS = ("i_in", "final_drive", "gears", "elements", "inertia")
-_HEAD = re.compile(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?")
-_ENTRY = re.compile(r"(\s*(?P<key>[\w-]+)\s*=\s*)(?P<value>[^#]*?)(\s*(?:#.*)?)")
-
-
-def list_numbers(text: str) -> dict[EntryPath, str]:
-    """Return the numbers of a card as a user types them: VALUE, VALUE+-STD or LOW..HIGH."""
-    document = parse_toml(text)
-    kept = {name: document[name] for name in _SECTIONS if name in document}
-    return dict(_iterate_numbers(kept, ()))
-
-
-def replace_numbers(text: str, typed: Mapping[EntryPath, str]) -> str:
-    """Return the text of a card with other numbers; comments and all other entries stay.
-
-    Raises InputError for a text that is no number, and for an entry that is not on a line of its
-    own.
-    """
-    known, lines = list_numbers(text), text.split("\n")
-    places = {path: number for number, path in _locate_lines(lines)}
-    wanted = deepcopy(parse_toml(text))
-    for path, number in typed.items():
-        if path not in known or number.strip() == known[path]:
-            continue
-        where = Where(key=format_path(path))
-        entry = _parse_number(number, where)
-        value = parse_toml(f"x = {entry}")["x"]
-        entries = {path: entry}
-        if path not in places and isinstance(value, dict):  # the number is a table of its own
-            entries = {(*path, part): f"{one!r}" for part, one in value.items()}
-        for place, one in entries.items():
-            found = _ENTRY.fullmatch(lines[places[place]]) if place in places else None
-            if found is None:
-                raise InputError("the entry is not on a line of its own", "edit the file", where)
-            lines[places[place]] = f"{found[1]}{one}{found[4]}"
-        _get_parent(wanted, path)[path[-1]] = value
-    changed = "\n".join(lines)
-    if parse_toml(changed) != wanted:
-        raise InputError("the form of the card cannot be changed here", "edit the file")
-    return changed
-
-
-def format_path(path: EntryPath) -> str:
-    """Return the place of an entry as a label; gears are counted from 1."""
-    return ".".join(str(part + 1) if isinstance(part, int) else part for part in path)
-
-
-def _iterate_numbers(value: Any, path: EntryPath) -> Iterator[tuple[EntryPath, str]]:
-    """Yield the numbers below a value of the document."""
-    match value:
-        case bool() | str():
-            return
-        case int() | float():
-            yield path, f"{value!r}"
-        case {"value": int() | float() as middle, "std": int() | float() as std, **rest} if (
-            not rest
-        ):
-            yield path, f"{middle!r}+-{std!r}"
-        case [int() | float() as low, int() | float() as high]:
-            yield path, f"{low!r}..{high!r}"
-        case dict():
-            for key, one in value.items():
-                yield from _iterate_numbers(one, (*path, key))
-        case list():
-            for number, one in enumerate(value):
-                yield from _iterate_numbers(one, (*path, number))
-
-
-def _parse_number(text: str, where: Where) -> str:
-    """Return the TOML of a typed number."""
-    try:
-        if ".." in text:
-            low, high = parse_range(text)
-            return f"[{low!r}, {high!r}]"
-        return parse_stated(text, -1e12).entry
-    except ValueError as fault:
-        raise InputError(str(fault), "type VALUE, VALUE+-STD or LOW..HIGH", where) from None
-
-
-def _locate_lines(lines: list[str]) -> Iterator[tuple[int, EntryPath]]:
-    """Yield the number of each line with an entry, and the place of the entry."""
-    table: EntryPath = ()
-    counts: dict[str, int] = {}
-    for number, line in enumerate(lines):
-        if head := _HEAD.fullmatch(line):
-            name = head[2]
-            table = tuple(part.strip().strip("\"'") for part in name.split("."))
-            if head[1] == "[[":
-                counts[name] = counts.get(name, -1) + 1
-                table = (*table, counts[name])
-        elif entry := _ENTRY.fullmatch(line):
-            yield number, (*table, entry["key"])
-
-
-def _get_parent(document: Any, path: EntryPath) -> Any:
-    for part in path[:-1]:
-        document = document[part]
-    return document

@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -146,15 +146,7 @@ def to_correction_document(found: Correction | None) -> dict[str, Any]:
             "rms_before": {name: before for name, (before, _) in found.rms.items()},
             "rms_after": {name: after for name, (_, after) in found.rms.items()},
             "parameters": values,
-            "learned": {
-                one.id: {
-                    "before": one.before,
-                    "before_std": one.before_std,
-                    "after": one.after,
-                    "after_std": one.after_std,
-                }
-                for one in found.values
-            },
+            "learned": {one.id: asdict(one) for one in found.values},
         }
     }
 

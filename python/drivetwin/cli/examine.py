@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from drivetwin._util.display_units import format_uncertainty, get_display_unit
+from drivetwin._util.plain_values import format_json
 from drivetwin.cli.fit import fit_logs
 from drivetwin.cli.identify import (
-    IdentifiedLog,
     build_outcome,
+    load_identified_card,
     run_identification,
     write_outcome,
 )
@@ -27,7 +28,6 @@ from drivetwin.estimation.data.prepare import collect_tolerances
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.files.result_file import (
     format_friction,
-    format_improvements,
     format_profile,
     format_suggestions,
 )
@@ -40,6 +40,8 @@ from drivetwin.report.sections.parameters import build_suggestion_blocks, format
 from drivetwin.report.sections.summary import build_friction_table
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
+from drivetwin.validation.validated_model import JointIdentification
+from drivetwin.vehicle.vehicle_card import VehicleCard
 
 SUGGESTIONS, FRICTION = "suggestions.json", "friction.json"
 
@@ -62,19 +64,18 @@ def examine(request: Examine) -> Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """One answer as a file and blocks; its `twin`, if any, is written as well."""
+    """One answer as a file and blocks."""
 
     file: str
     text: str
     blocks: Sequence[Block]
-    twin: Twin | None = None
 
 
 def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
     """Identify a log; return every answer in the order of printing, and the identification."""
     assert request.vehicle is not None
     how = IdentifyOptions(vehicle=request.vehicle, channels=request.channels)
-    made = run_identification(request.log, how)
+    made = run_identification([request.log], how)
     found = made.found
     with show_step("comparing experiments"):
         suggestions = found.evidence.suggestions or compute_rankings(found)
@@ -87,22 +88,23 @@ def _examine_log(request: Examine) -> tuple[list[Answer], Outcome]:
         *_iterate_profiles(found, request, compute_profile),
     ]
     if request.friction is not None:
-        friction = _identify_friction(made, request.friction)
-        answers.append(friction)
-        made = replace(made, twin=friction.twin or made.twin)
+        answer, twin = _identify_friction(made, load_identified_card(how), request.friction)
+        answers.append(answer)
+        made = replace(made, twins={request.log.name: twin})
     files = () if request.output is None else write_outcome(made, request.output)
     return answers, build_outcome(found, files)
 
 
-def _identify_friction(outcome: IdentifiedLog, shape: FrictionShape) -> Answer:
-    """Friction of a shape, with the twin that has it."""
-    found = outcome.found
+def _identify_friction(
+    made: JointIdentification, card: VehicleCard, shape: FrictionShape
+) -> tuple[Answer, Twin]:
+    """Friction of a shape, and the twin that has it."""
+    found = made.found
     with show_step(f"fitting {shape} friction"):
-        tolerances = collect_tolerances(outcome.log, outcome.card, found.shifts[0])
-        one = fit_friction_shape(found, shape, EffectPriors(outcome.card.effects, tolerances))
-    shaped = replace(found, friction={**found.friction, **one.curves})
-    twin = build_twin(shaped, outcome.card)
-    return Answer(FRICTION, format_friction(one), [build_friction_table(one.curves)], twin)
+        tolerances = collect_tolerances(made.fitted[0], card, found.shifts[0])
+        one = fit_friction_shape(found, shape, EffectPriors(card.effects, tolerances))
+    twin = build_twin(replace(found, friction={**found.friction, **one.curves}), card)
+    return Answer(FRICTION, format_friction(one), [build_friction_table(one.curves)]), twin
 
 
 def _build_profile_table(one: Profile, unit: str) -> TableBlock:
@@ -124,10 +126,11 @@ def _examine_fit(request: Examine) -> tuple[list[Answer], Outcome]:
     found, outcome = fit_logs(how)
     units = {name: one.unit for name, one in found.estimates.items()}
     improvements = rank_improvements(found)
+    rows = [{**asdict(one), "repeats": REPEATS, "unit": units[one.unknown]} for one in improvements]
     answers = [
         Answer(
             SUGGESTIONS,
-            format_improvements(improvements, units),
+            format_json({"suggestions": rows}),
             [_build_improvement_table(improvements, units)],
         ),
         *_iterate_profiles(found, request, of_fit.compute_profile),

@@ -6,17 +6,13 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections import Counter, deque
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections import Counter
 from pathlib import Path
 from time import monotonic
 
-from rich.live import Live
-from rich.text import Text
-
+from drivetwin._util.progress import notify_progress
 from drivetwin._util.text import escape_json
-from drivetwin.cli.output import format_duration, make_console, print_line, show_step
+from drivetwin.cli.output import make_console, print_line, show_step
 from drivetwin.cli.requests.desk import EstimateFleet, QueryFleet, ReportFleet, RunFleet
 from drivetwin.errors import INTERRUPTED, InputError
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
@@ -30,7 +26,6 @@ from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import (
     Event,
     Limits,
-    Listener,
     Noted,
     Retried,
     Settled,
@@ -40,79 +35,39 @@ from drivetwin.fleet.task import (
 )
 from drivetwin.report.blocks import Outcome, Tone, VerdictBlock, make_notes, make_table
 
-_REFRESH = 0.25
-"""Time [s] between two drawings of the line."""
 _LINE_EVERY = 30.0
 """Time [s] between two lines where nobody watches."""
-_RATE_SPAN = 60.0
-"""Time [s] over which the rate is counted."""
 
 
 class RunProgress:
-    """Running totals of a run as one line: counts, present rate, time left, failures by reason.
+    """Running totals of a run: counts, retries and failures by reason."""
 
-    A terminal draws the line anew; elsewhere it is printed now and then.
-    """
-
-    def __init__(self, *, is_drawn: bool) -> None:
-        self.files = self.settled = self.retries = 0
-        self.failures: Counter[str] = Counter()
-        self._recent: deque[tuple[float, int]] = deque()
-        self._next = math.inf if is_drawn else monotonic() + _LINE_EVERY
+    def __init__(self) -> None:
+        self._files = self._settled = 0
+        self._counts: Counter[str] = Counter()
+        drawn = make_console(stderr=True).is_terminal
+        self._next = math.inf if drawn else monotonic() + _LINE_EVERY
 
     def handle(self, event: Event) -> None:
-        """Update the totals with an event of the run."""
+        """Update the totals with an event of the run, and show them."""
         match event:
-            case Started():
-                self.files = event.files
+            case Started(files=files):
+                self._files = files
                 if event.dashboard:
                     print_line(f"dashboard: {event.dashboard}")
             case Settled():
-                self.settled += 1
-                self.failures.update([event.error] if event.error else [])
+                self._settled += 1
+                self._counts.update([event.error] if event.error else [])
             case Retried():
-                self.retries += 1
+                self._counts["retries"] += 1
             case Noted():
                 print_line(event.text)
-        now = monotonic()
-        self._recent.append((now, self.settled))
-        while self._recent[0][0] < now - _RATE_SPAN:
-            self._recent.popleft()
-        if now >= self._next and not isinstance(event, Summary):
-            print_line(str(self))
-            self._next = now + _LINE_EVERY
-
-    def compute_rate(self) -> float:
-        """Compute the recent rate [files/s]; 0 without enough events."""
-        if len(self._recent) < 2:
-            return 0.0
-        (start, before), (end, after) = self._recent[0], self._recent[-1]
-        return (after - before) / (end - start) if end > start else 0.0
-
-    def __str__(self) -> str:
-        rate = self.compute_rate()
-        left = f", {format_duration((self.files - self.settled) / rate)} left" if rate > 0.0 else ""
-        failed = "".join(f", {count} {name}" for name, count in self.failures.most_common())
-        lost = f", {self.retries} retries" if self.retries else ""
-        return f"{self.settled} of {self.files} logs, {rate:.1f}/s{left}{failed}{lost}"
-
-
-@contextmanager
-def show_progress(*, as_json: bool) -> Iterator[Listener]:
-    """Yield the listener that shows a run: events as JSON, a line drawn anew, or lines."""
-    if as_json:
-        yield _print_event
-        return
-    shown = make_console(stderr=True)
-    progress = RunProgress(is_drawn=shown.is_terminal)
-    if not shown.is_terminal:
-        yield progress.handle
-        return
-    with Live(
-        get_renderable=lambda: Text(str(progress)), console=shown, transient=True,
-        refresh_per_second=1.0 / _REFRESH,
-    ):  # fmt: skip
-        yield progress.handle
+        listed = "".join(f", {count} {name}" for name, count in self._counts.most_common())
+        text = f"{self._settled} of {self._files} logs{listed}"
+        notify_progress(self._settled / max(self._files, 1), text)
+        if monotonic() >= self._next and not isinstance(event, Summary):
+            print_line(text)
+            self._next = monotonic() + _LINE_EVERY
 
 
 def _print_event(event: Event) -> None:
@@ -130,8 +85,10 @@ def run(request: RunFleet) -> Outcome:
         rules=read_rules(request.vehicle),
         store=request.output,
     )
-    with show_progress(as_json=request.as_json) as tell:
-        return _build_outcome(run_fleet(wanted, tell), request)
+    if request.as_json:
+        return _build_outcome(run_fleet(wanted, _print_event), request)
+    with show_step("identifying"):
+        return _build_outcome(run_fleet(wanted, RunProgress().handle), request)
 
 
 def _explain(summary: Summary, output: Path) -> VerdictBlock:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from drivetwin._util.progress import TimedStages, scale_progress
@@ -34,31 +34,18 @@ from drivetwin.findings import Finding
 from drivetwin.logs.read import read_log
 from drivetwin.plausibility.check import check_card
 from drivetwin.report.blocks import Outcome
-from drivetwin.report.html import build_joint_page, save_page, save_report
-from drivetwin.report.notebook import build_identification_blocks
+from drivetwin.report.html import build_identification_blocks, build_report_page, save_page
 from drivetwin.shifts.detect import FoundShifts, detect_shifts, refuse_without_shifts
 from drivetwin.tcu.card import is_controller_card
-from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import (
     JointIdentification,
     Source,
     identify_together,
-    identify_validated,
 )
 from drivetwin.vehicle.card import VehicleCard, is_ratio_card, load_card
 from drivetwin.vehicle.effects import parse_priors
 
 _READING = TimedStages("reading", ("log", "shifts", "card"))
-
-
-@dataclass(frozen=True, eq=False)
-class IdentifiedLog:
-    """Result of one log: the log, its card, the identification and the twin."""
-
-    log: ShiftLog
-    card: VehicleCard
-    found: Identification
-    twin: Twin
 
 
 def load_identified_card(how: IdentifyOptions) -> VehicleCard:
@@ -82,29 +69,31 @@ def read_shifts(
         return log, shifts, tuple(check_card(card, log, shifts.shifts))
 
 
-def run_identification(log: Path, how: IdentifyOptions) -> IdentifiedLog:
-    """Read, find shifts, identify, and validate by simulation.
+def run_identification(
+    logs: Sequence[Path], how: IdentifyOptions, wanted: Sequence[str] = ()
+) -> JointIdentification:
+    """Read logs, fit what is not `wanted` for prediction together, validate and predict.
 
     Raises the typed errors of each stage; NoShiftError lists what was refused and why.
     """
-    with show_step(f"reading {log.name}"):
-        card = load_identified_card(how)
-        recording, shifts, doubts = read_shifts(log, how, card)
-    show_findings(doubts)
-    refuse_without_shifts(recording, card, shifts)
+    refuse_same_names(logs, "rename one of them")
+    card = load_identified_card(how)
+    with show_step(f"reading {logs[0].name if len(logs) == 1 else f'{len(logs)} logs'}"):
+        reads = []
+        for number, path in enumerate(logs):
+            with scale_progress(number / len(logs), (number + 1) / len(logs)):
+                reads.append(read_shifts(path, how, card))
+    show_findings(dict.fromkeys(one for _, _, doubts in reads for one in doubts))
+    for log, each, _ in reads:
+        refuse_without_shifts(log, card, each)
+    held = parse_holdouts(wanted, logs, [each for _, each, _ in reads])
+    sources = [Source(log, each, part) for (log, each, _), part in zip(reads, held, strict=True)]
     with show_step(f"identifying by the {how.method} method"), quick(how.quick):
-        model = identify_validated(recording, card, shifts, how.method)
-    found = model.result
-    if found.method is Method.LIKELIHOOD:
-        with show_step("comparing experiments"):
-            found = rank_for_weak(found)
-    return IdentifiedLog(recording, card, found, model.twin)
-
-
-def identify_log(log: Path, how: IdentifyOptions, folder: Path | None) -> Outcome:
-    """Identify a log, and write the result if a folder is given."""
-    made = run_identification(log, how)
-    return build_outcome(made.found, () if folder is None else write_outcome(made, folder))
+        made = identify_together(sources, card, how.method)
+    if how.method is Method.PAPER:
+        return made
+    with show_step("comparing experiments"):
+        return replace(made, found=rank_for_weak(made.found))
 
 
 def build_outcome(found: Identification, files: Sequence[Path]) -> Outcome:
@@ -113,86 +102,8 @@ def build_outcome(found: Identification, files: Sequence[Path]) -> Outcome:
     return Outcome(build_identification_blocks(found), document, files, found.status.is_confirmed)
 
 
-def write_outcome(outcome: IdentifiedLog, folder: Path) -> tuple[Path, ...]:
-    """Write result, twin and report into `folder`, all or none; returns their paths."""
-    with show_step("writing the report"), write_atomically(folder) as beside:
-        save_result(beside / RESULT, outcome.found)
-        save_twin(beside / TWIN, outcome.twin)
-        save_report(beside / REPORT, outcome.found, outcome.log)
-    return tuple(folder / name for name in (RESULT, TWIN, REPORT))
-
-
-def identify(request: Identify) -> Iterator[Outcome]:
-    """Identify logs one by one or jointly, or all logs of a bus or of a gearbox control."""
-    logs, how = request.logs, request.options
-    is_controller = request.vehicle is not None and is_controller_card(request.vehicle)
-    if is_controller or _is_bus(request):
-        # A log of shifts does not wait for the import of other estimators.
-        from drivetwin.cli.identify_whole_logs import identify_bus_logs, identify_controller_logs
-
-        yield (identify_controller_logs if is_controller else identify_bus_logs)(request)
-        return
-    if request.together or request.hold_out:
-        yield identify_jointly(logs, how, request.hold_out, request.output)
-        return
-    folders = _choose_folders(logs, request.output)
-    for log in logs:
-        try:
-            yield identify_log(log, how, folders.get(log))
-        except DrivetwinError as error:
-            error.where = replace(error.where, file=error.where.file or str(log))
-            if len(logs) == 1 or error.where.file in (str(request.vehicle), str(request.channels)):
-                raise
-            yield Outcome(fault=error)
-
-
-def _is_bus(request: Identify) -> bool:
-    """Return True if speeds, gear and engine torque alone are to be used."""
-    return request.bus or request.vehicle is None or is_ratio_card(request.vehicle)
-
-
-def _choose_folders(logs: Sequence[Path], output: Path | None) -> dict[Path, Path]:
-    """Output folder of each log; empty where nothing is to be written."""
-    if output is None:
-        return {}
-    if len(logs) == 1:
-        return {logs[0]: output}
-    refuse_same_names(logs, "identify them in separate runs with different -o")
-    return {log: output / log.stem for log in logs}
-
-
-def identify_jointly(
-    logs: Sequence[Path], how: IdentifyOptions, wanted: Sequence[str], folder: Path | None
-) -> Outcome:
-    """Read all logs, fit what is not held out together, predict the rest, and write the result.
-
-    Raises the typed errors of each stage.
-    """
-    refuse_same_names(logs, "rename one of them")
-    card = load_identified_card(how)
-    with show_step(f"reading {len(logs)} logs"):
-        reads = []
-        for number, path in enumerate(logs):
-            with scale_progress(number / len(logs), (number + 1) / len(logs)):
-                reads.append(read_shifts(path, how, card))
-    show_findings(dict.fromkeys(one for _, _, doubts in reads for one in doubts))
-    for log, each, _ in reads:
-        refuse_without_shifts(log, card, each)
-    read, shifts = [log for log, _, _ in reads], [each for _, each, _ in reads]
-    held = parse_holdouts(wanted, logs, shifts)
-    sources = [
-        Source(log, found, each) for log, found, each in zip(read, shifts, held, strict=True)
-    ]
-    with show_step(f"identifying by the {how.method} method"), quick(how.quick):
-        made = identify_together(sources, card, how.method)
-    with show_step("comparing experiments"):
-        found = rank_for_weak(made.found)
-    made = replace(made, found=found)
-    return build_outcome(found, () if folder is None else _write_joint(made, folder))
-
-
-def _write_joint(made: JointIdentification, folder: Path) -> tuple[Path, ...]:
-    """Write result, report and twins into `folder`, all or none; returns their paths.
+def write_outcome(made: JointIdentification, folder: Path) -> tuple[Path, ...]:
+    """Write result, report and twins into `folder`, all or none; return their paths.
 
     `twin.toml` is that of the first log; of several each has `NAME-OF-LOG.twin.toml` besides.
     """
@@ -204,8 +115,44 @@ def _write_joint(made: JointIdentification, folder: Path) -> tuple[Path, ...]:
         save_result(beside / RESULT, made.found)
         for name, twin in named.items():
             save_twin(beside / name, twin)
-        save_page(beside / REPORT, build_joint_page(made.found, made.fitted))
+        save_page(beside / REPORT, build_report_page(made.found, made.fitted))
     return tuple(folder / name for name in (RESULT, *named, REPORT))
+
+
+def identify(request: Identify) -> Iterator[Outcome]:
+    """Identify logs one by one or jointly, or all logs of a bus or of a gearbox control."""
+    logs = request.logs
+    is_controller = request.vehicle is not None and is_controller_card(request.vehicle)
+    if is_controller or _is_bus(request):
+        # A log of shifts does not wait for the import of other estimators.
+        from drivetwin.cli.identify_whole_logs import identify_bus_logs, identify_controller_logs
+
+        yield (identify_controller_logs if is_controller else identify_bus_logs)(request)
+        return
+    together = request.together or request.hold_out or len(logs) == 1
+    for group in [logs] if together else _divide(logs, request.output):
+        folder = request.output and (request.output if together else request.output / group[0].stem)
+        try:
+            made = run_identification(group, request.options, request.hold_out)
+            yield build_outcome(made.found, () if folder is None else write_outcome(made, folder))
+        except DrivetwinError as error:
+            if len(group) == 1:
+                error.where = replace(error.where, file=error.where.file or str(group[0]))
+            if together or error.where.file in (str(request.vehicle), str(request.channels)):
+                raise
+            yield Outcome(fault=error)
+
+
+def _is_bus(request: Identify) -> bool:
+    """Return True if speeds, gear and engine torque alone are to be used."""
+    return request.bus or request.vehicle is None or is_ratio_card(request.vehicle)
+
+
+def _divide(logs: Sequence[Path], output: Path | None) -> list[Sequence[Path]]:
+    """Return the logs one by one; raises InputError where their results would share a folder."""
+    if output is not None:
+        refuse_same_names(logs, "identify them in separate runs with different -o")
+    return [[log] for log in logs]
 
 
 def parse_holdouts(
@@ -226,11 +173,11 @@ def parse_holdouts(
 
 def _parse_shift(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
     """Place of the log, and number of the shift; None for all of them."""
-    whole = _find_logs(text, logs)
+    whole = find_logs(text, logs)
     if len(whole) == 1:
         return whole[0], None
     name, _, number = text.rpartition(":")
-    places = _find_logs(name, logs) if name else list(range(len(logs)))
+    places = find_logs(name, logs) if name else list(range(len(logs)))
     if not re.fullmatch(r"\d{1,9}", number) or len(places) != 1:
         raise InputError(
             f"{text!r} names no shift or log of {', '.join(log.name for log in logs)}",
@@ -240,5 +187,6 @@ def _parse_shift(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
     return places[0], int(number)
 
 
-def _find_logs(name: str, logs: Sequence[Path]) -> list[int]:
+def find_logs(name: str, logs: Sequence[Path]) -> list[int]:
+    """Find the places of the logs of a name, with or without folder and ending."""
     return [k for k, log in enumerate(logs) if name in (str(log), log.name, log.stem)]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from drivetwin.channels.shiftlog import ShiftLog
+from drivetwin.cli.identify import find_logs
 from drivetwin.cli.input_files import find_mapping
 from drivetwin.cli.options import (
     BUS_RESULT,
@@ -111,7 +112,7 @@ def _find_held(wanted: Sequence[str], logs: Sequence[Path]) -> list[Path]:
     """Logs to predict; raises InputError for a name of none, and where no log is left."""
     held = []
     for text in wanted:
-        found = [one for one in logs if text in (str(one), one.name, one.stem)]
+        found = [logs[k] for k in find_logs(text, logs)]
         if len(found) != 1:
             raise InputError(
                 f"{text!r} names no log of {', '.join(one.name for one in logs)}",

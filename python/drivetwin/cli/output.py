@@ -7,12 +7,10 @@ import shutil
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from math import exp
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -102,65 +100,6 @@ def _map_to_target(file: object, beside: Path, folder: Path) -> str | None:
 
 NOT_CONFIRMED = 3
 """Exit code of a result that is not confirmed, with --strict."""
-_QUIET = 1.0
-"""Time [s] for which a step is shown without numbers: most are over by then."""
-_EARLY = 0.05
-"""Share done below which the time left would be a guess."""
-_SMOOTHING = 0.1
-"""Part of the time gone over which the estimates of the whole time are averaged."""
-
-
-class Remaining:
-    """A line of text on a running step; reads anew each time it is shown."""
-
-    def __init__(self, text: str, clock: Callable[[], float] = monotonic) -> None:
-        self._text = text
-        self._clock = clock
-        self._start = clock()
-        self._share = 0.0
-        self._what = ""
-        self._whole: float | None = None
-        self._latest = 0.0
-
-    def update(self, share: float, what: str) -> None:
-        """Listener of the computation, see `drivetwin._util.progress`."""
-        if share > self._share:
-            gone = self._clock() - self._start
-            whole = gone / share
-            if self._whole is not None:
-                kept = exp(-(gone - self._latest) / max(_SMOOTHING * gone, 1e-9))
-                whole += kept * (self._whole - whole)
-            self._whole, self._latest = whole, gone
-        self._share, self._what = share, what
-
-    def estimate_time_left(self) -> float | None:
-        """Estimate the time left [s]; None early in a step and where it takes longer than
-        estimated."""
-        gone = self._clock() - self._start
-        if self._whole is None or gone < _QUIET or not _EARLY <= self._share < 1.0:
-            return None
-        left = self._whole - gone
-        return left if left > 0.0 else None
-
-    def __str__(self) -> str:
-        gone = self._clock() - self._start
-        if gone < _QUIET:
-            return self._text
-        doing = f"{self._text}, {self._what}" if self._what else self._text
-        share = f"{100.0 * self._share:.0f} %, " if _EARLY <= self._share < 1.0 else ""
-        left = self.estimate_time_left()
-        if left is None:
-            return f"{doing}: {share}{format_duration(gone)} so far"
-        return f"{doing}: {share}about {format_duration(left)} left"
-
-
-def format_duration(seconds: float) -> str:
-    """Rounded to what a waiting person needs: seconds, minutes, hours."""
-    if seconds < 60.0:
-        return f"{max(1, round(seconds))} s"
-    if seconds < 3600.0:
-        return f"{round(seconds / 60.0)} min"
-    return f"{seconds / 3600.0:.1f} h"
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -237,18 +176,30 @@ def _build_document(one: Outcome) -> dict[str, Any]:
 def show_step(text: str) -> Iterator[None]:
     """Display a step on stderr while it runs, if stderr is a terminal.
 
-    The text contains share and time left if the computation reports them, else the elapsed time.
+    Share and time left follow from what the computation reports.
     """
-    from rich.progress import Progress, SpinnerColumn, TextColumn
+    from rich.progress import (
+        Progress,
+        SpinnerColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     from drivetwin._util.progress import attach_listener
 
-    clock = Remaining(text)
-    columns = (SpinnerColumn(), TextColumn("{task.fields[clock]}", markup=False))
+    words = TextColumn("{task.description}", markup=False)
+    times = (TimeElapsedColumn(), TimeRemainingColumn())
     shown = make_console(stderr=True)
+    columns = (SpinnerColumn(), words, TaskProgressColumn(), *times)
     with Progress(*columns, console=shown, transient=True, disable=not shown.is_terminal) as live:
-        live.add_task("", total=None, clock=clock)
-        with attach_listener(clock.update):
+        task = live.add_task(text, total=1.0)
+
+        def update(share: float, what: str) -> None:
+            live.update(task, completed=share, description=f"{text}, {what}" if what else text)
+
+        with attach_listener(update):
             yield
 
 

@@ -174,11 +174,12 @@ def _apply_parameters(twin: Twin, parameters: Path, template: Path | None) -> Tw
     if template is not None:
         content = restore_entries(content, collect_parameters(twin), read_template(template))
     update = update_twin(twin, content)
-    print_line(f"{parameters.name} changes {', '.join(update.changed) or 'nothing'}", stderr=True)
-    if update.idle:
-        print_line(f"no simulation depends on {', '.join(update.idle)}", stderr=True)
-    if update.unknown:
-        print_line(f"not of this twin: {', '.join(update.unknown)}", stderr=True)
-    if content.skipped:
-        print_line(f"neither number nor curve: {', '.join(content.skipped)}", stderr=True)
+    for text, names in (
+        (f"{parameters.name} changes", update.changed or ("nothing",)),
+        ("no simulation depends on", update.idle),
+        ("not of this twin:", update.unknown),
+        ("neither number nor curve:", content.skipped),
+    ):
+        if names:
+            print_line(f"{text} {', '.join(names)}", stderr=True)
     return update.twin

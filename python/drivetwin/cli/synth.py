@@ -15,7 +15,7 @@ from drivetwin.cli.options import REPORT
 from drivetwin.cli.output import show_step, write_atomically, write_texts
 from drivetwin.cli.requests.identification import Demonstrate, IdentifyOptions, Synthesize
 from drivetwin.dyno import ScenarioName
-from drivetwin.dyno.dyno import DynoRun, run
+from drivetwin.dyno.dyno import DynoRun
 from drivetwin.dyno.dyno import run as run_dyno
 from drivetwin.dyno.scenario_file import (
     convert_channels,
@@ -37,9 +37,8 @@ from drivetwin.tcu.synthesize import make_log
 
 def synth(request: Synthesize) -> Outcome:
     """Write a log with its card or model and its truth."""
-    write = _write_scenario_log if request.model is None else _write_model_log
-    if request.model is None and request.scenario is ScenarioName.CONTROLLER_LOG:
-        write = _write_controller_log
+    is_text = request.model is not None or request.scenario is ScenarioName.CONTROLLER_LOG
+    write = _write_text_log if is_text else _write_scenario_log
     with show_step(f"running {request.model or request.scenario}"):
         files = write(request)
     return Outcome(document=files, files=tuple(files.values()))
@@ -50,43 +49,34 @@ def _write_scenario_log(request: Synthesize) -> dict[str, Path]:
     setup = load_scenario(request.scenario, request.drum)
     setup = setup.set_torque_reduction(request.torque_reduction)
     effects = parse_effects(request.effect)
-    bench = run(setup, request.seed, noise=request.noise, effects=effects)
+    bench = run_dyno(setup, request.seed, noise=request.noise, effects=effects)
     log, card, truth = write_run(request.output, bench)
     return {"log": log, "card": card, "truth": truth}
 
 
-def _write_controller_log(request: Synthesize) -> dict[str, Path]:
-    """Write log, card and truth of shifts as a gearbox control logs them, all or none."""
-    output, place = request.output, Where(file=str(request.output))
-    if output.suffix.casefold() != ".csv":
-        what = "the log of a gearbox control is a CSV file"
-        raise InputError(what, "give a name that ends in .csv", place)
-    if request.effect or request.drum is not None or request.torque_reduction:
-        what = "the log of a gearbox control has no effects, drums or torque reduction to choose"
-        raise InputError(what, "leave out --effect, --drum and --torque-reduction")
-    made = make_log(request.seed, noise=request.noise)
-    files = {
-        "log": (output, made.log),
-        "card": (output.with_suffix(".card.toml"), made.card),
-        "truth": (output.with_suffix(".truth.json"), made.truth),
-    }
-    write_texts(output.parent, {path.name: text for path, text in files.values()})
-    return {name: path for name, (path, _) in files.items()}
+def _write_text_log(request: Synthesize) -> dict[str, Path]:
+    """Write the log of a model, or of a gearbox control, all or none; return the paths.
 
-
-def _write_model_log(request: Synthesize) -> dict[str, Path]:
-    """Write log, model file and truth of the manoeuvre of a model, all or none."""
-    output, place = request.output, Where(file=str(request.output))
+    Model file or card, and the truth, are beside it.
+    """
+    output, model = request.output, request.model
     if output.suffix.casefold() != ".csv":
-        raise InputError("the log of a model is a CSV file", "give a name that ends in .csv", place)
-    made = synthesize_log(*find_model(request.model or ""), request.seed, request.noise)
-    files = {
-        "log": (output, made.log),
-        "model": (output.with_suffix(".model.toml"), made.model),
-        "truth": (output.with_suffix(".truth.json"), made.truth),
-    }
-    write_texts(output.parent, {path.name: text for path, text in files.values()})
-    return {name: path for name, (path, _) in files.items()}
+        raise InputError(
+            "this log is a CSV file", "give a name that ends in .csv", Where(file=str(output))
+        )
+    if model is not None:
+        fitted = synthesize_log(*find_model(model), request.seed, request.noise)
+        kind, texts = "model", (fitted.log, fitted.model, fitted.truth)
+    else:
+        request.refuse_stated(
+            ("effect", "drum", "torque_reduction"), "the log of a gearbox control has no choice"
+        )
+        made = make_log(request.seed, noise=request.noise)
+        kind, texts = "card", (made.log, made.card, made.truth)
+    paths = (output, output.with_suffix(f".{kind}.toml"), output.with_suffix(".truth.json"))
+    names = (one.name for one in paths)
+    write_texts(output.parent, dict(zip(names, texts, strict=True)))
+    return dict(zip(("log", kind, "truth"), paths, strict=True))
 
 
 def write_run(output: Path, run: DynoRun) -> tuple[Path, Path, Path]:
@@ -143,7 +133,7 @@ def demo(request: Demonstrate) -> Outcome:
     bench = run_dyno(load_scenario(scenario), request.seed, noise=request.noise)
     log, card, _ = write_run(output / f"{scenario}.csv", bench)
     outcomes = {
-        method: run_identification(log, IdentifyOptions(vehicle=card, method=method))
+        method: run_identification([log], IdentifyOptions(vehicle=card, method=method))
         for method in _METHODS
     }
     for method, outcome in outcomes.items():

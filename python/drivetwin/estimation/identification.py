@@ -146,8 +146,7 @@ class StageResults:
     signals: tuple[ShiftSignals, ...] = ()
     """Measured signals of each shift; for every method."""
     paper: tuple[PaperShift, ...] = ()
-    """The paper's stages on each shift: beside the other methods for comparison, where it can be
-    computed and the log has an output torque."""
+    """The paper's stages on each shift; empty for the likelihood method."""
     likelihood: LikelihoodFit | None = None
     """Common fit of all shifts; None for the paper's method, or if the fit did not converge."""
     gave_up: str = ""

@@ -15,7 +15,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import format_with_unit
-from drivetwin._util.progress import TimedStages
+from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError, Where
 from drivetwin.estimation.data.select_shifts import drop_unbalanced
 from drivetwin.estimation.data.shift_data import DesignData, PreparedLog
@@ -66,14 +66,13 @@ ONE_MODEL = (
     "quick identification: the load is constant in each shift and all signals are as read; other "
     "sampling modes, minima and elements were not tried"
 )
-_LIKELIHOOD = TimedStages("likelihood estimation", ("likelihood", "paper"))
 
 
 def identify(log: PreparedLog, method: Method = DEFAULT_METHOD) -> Identification:
     """Identify the driveline from all prepared shifts of a log.
 
-    The paper's stages run beside the likelihood for comparison, and give the values where that
-    fails. The results of each stage are in `evidence`.
+    The paper's stages give the values where the likelihood fails. The results of each stage are in
+    `evidence`.
     Raises IdentificationError if the data cannot carry the method.
     """
     if method is Method.PAPER and not log.scale_known:
@@ -176,20 +175,11 @@ def _estimate(log: PreparedLog, method: Method) -> _Stage:
     from drivetwin.estimation.likelihood.pipeline import estimate_likelihood
 
     try:
-        with _LIKELIHOOD.enter("likelihood", "likelihood"):
+        with scale_progress(0.0, 1.0, "likelihood"):
             found, fit = estimate_likelihood(log.signals, log.drivelines, log.design)
     except IdentificationError as error:
         return _replace_failed(log, error)
-    found, evidence = _complete(found, log), StageResults(likelihood=fit)
-    if not log.scale_known:
-        return found, method, evidence
-    try:
-        with _LIKELIHOOD.enter("paper", "paper's method"):
-            evidence = replace(evidence, paper=_identify_paper_shifts(log))
-    except IdentificationError as error:
-        failed = report(Code.PAPER_METHOD_FAILED, why=error.what)
-        found = replace(found, findings=(*found.findings, failed))
-    return found, method, evidence
+    return _complete(found, log), method, StageResults(likelihood=fit)
 
 
 def _estimate_by_paper(log: PreparedLog, evidence: StageResults) -> _Stage:

@@ -7,8 +7,6 @@ The files of `examine` are suggestions, profiles and friction curves, SI.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal
 
@@ -37,7 +35,6 @@ from drivetwin.files.records import (
     SuggestionRecord,
     read_record,
 )
-from drivetwin.fit.examine import REPEATS, Improvement
 from drivetwin.likelihood.profile import Profile
 from drivetwin.shifts.shift import RejectedShift
 from drivetwin.vehicle.spec import ShiftKind
@@ -238,12 +235,6 @@ def load_result(path: Path | str) -> ResultFile:
 def format_suggestions(found: tuple[ExperimentRanking, ...]) -> str:
     """`suggestions.json`: by parameter the experiments in order of worth; infinite widths null."""
     rows = [SuggestionRecord.from_result(one).model_dump(mode="json") for one in found]
-    return format_json({"suggestions": rows})
-
-
-def format_improvements(found: Sequence[Improvement], units: Mapping[str, str]) -> str:
-    """`suggestions.json` of a fit: half widths of the intervals, and what would narrow them."""
-    rows = [{**asdict(one), "repeats": REPEATS, "unit": units[one.unknown]} for one in found]
     return format_json({"suggestions": rows})
 
 

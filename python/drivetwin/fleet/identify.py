@@ -158,7 +158,7 @@ def identify_log(task: Task) -> Found:
     found = attach_validation(found, twin, log)
     if task.report is not None:
         with convert_write_errors():
-            _save_page(Path(task.report), build_report_page(found, log))
+            _save_page(Path(task.report), build_report_page(found, [log]))
     rows = [*_compute_channel_means(task, mapping), *make_result_rows(found, card, recipe.mu_slip)]
     return Found(rows, make_shift_rows(found_shifts))
 

@@ -17,7 +17,7 @@ import threading
 from concurrent.futures import CancelledError
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from time import monotonic, sleep
+from time import monotonic
 from typing import IO, Any
 from uuid import uuid4
 
@@ -264,7 +264,6 @@ _FIRST_CONTACT = 10.0
 """Time [s] in which a scheduler must answer at the start ..."""
 _PATIENCE = 600.0
 """... and in which one that went away may come back."""
-_PAUSE = 1.0
 _COUNT_EVERY = 5.0
 """Time [s] after which the cluster's threads are counted anew: it may grow and shrink."""
 
@@ -288,19 +287,18 @@ class DaskPool:
     def __init__(
         self, address: str, spec: WorkerSpec, tell: Listener, patience: float = _PATIENCE
     ) -> None:
-        self._distributed = _import_distributed_quietly(address)
-        self._scheduler = address
-        self._spec = spec
-        self._tell = tell
-        self._patience = patience
-        self._replies: SimpleQueue[tuple[int, Any]] = SimpleQueue()
-        self._out: dict[int, tuple[Task, Any]] = {}
-        self._submitted = 0
-        # Dask takes tasks of one key for one task: two runs of the same logs must not share them.
-        self._run = uuid4().hex
-        self._client = self._connect(_FIRST_CONTACT)
+        client = _import_distributed_quietly(address).Client
+        self._scheduler, self._spec, self._tell = address, spec, tell
+        self._replies: SimpleQueue[tuple[Task, Any]] = SimpleQueue()
+        self._out: set[Any] = set()
+        self._is_away = False
         self._counted = 0.0
         self._threads = 0
+        try:
+            client(address, timeout=_FIRST_CONTACT, set_as_default=False).close()
+            self._client = client(address, timeout=patience, set_as_default=False)
+        except (OSError, TimeoutError, ValueError):
+            raise self._make_absence_error() from None
 
     @property
     def address(self) -> str | None:
@@ -311,6 +309,8 @@ class DaskPool:
     @property
     def capacity(self) -> int:
         """As many tasks as keep the cluster's threads busy; without workers none."""
+        if self._client.status != "running":
+            return 0
         if monotonic() - self._counted > _COUNT_EVERY or not self._threads:
             self._counted = monotonic()
             with contextlib.suppress(OSError, TimeoutError):
@@ -319,76 +319,47 @@ class DaskPool:
 
     def submit(self, task: Task) -> None:
         """Give out a task."""
-        self._submitted += 1
-        number = self._submitted
-        self._out[number] = (task, None)
-        try:
-            future = self._client.submit(
-                run_guarded, task.to_json(), self._spec, key=f"{task.log}-{self._run}-{number}",
-                pure=False, retries=0,
-            )  # fmt: skip
-        except Exception as fault:
-            # The client raises many types when its scheduler is gone; `next` then reconnects.
-            self._replies.put((number, fault))
-            return
-        self._out[number] = (task, future)
-        future.add_done_callback(lambda done: self._replies.put((number, done)))
+        # Dask takes tasks of one key for one task: two runs of the same logs must not share them.
+        future = self._client.submit(
+            run_guarded, task.to_json(), self._spec, key=f"{task.log}-{uuid4().hex}",
+            pure=False, retries=0,
+        )  # fmt: skip
+        self._out.add(future)
+        future.add_done_callback(lambda done: self._replies.put((task, done)))
 
     def next(self, timeout: float) -> tuple[Task, Reply] | None:
         """Return the next reply, or None after `timeout` [s].
 
-        Raises SchedulerError where the scheduler stays away.
+        A client that loses its scheduler cancels its tasks and connects again by itself. Raises
+        SchedulerError where the scheduler stays away.
         """
+        status = self._client.status
+        if status == "closed":
+            raise self._make_absence_error()
+        if self._is_away is (status == "running"):
+            self._is_away = not self._is_away
+            lost = f"lost the scheduler at {self._scheduler}; waiting for it"
+            self._tell(Noted(lost if self._is_away else "the scheduler is back"))
         try:
-            number, done = self._replies.get(timeout=timeout)
+            task, done = self._replies.get(timeout=timeout)
         except Empty:
-            if self._client.status != "running":
-                self._reconnect()
             return None
-        task, _ = self._out.pop(number, (None, None))
-        if task is None:  # cancelled before, and submitted again
-            return None
-        if isinstance(done, Exception):
-            return task, WorkerLost("the scheduler went away", blame=False)
+        self._out.discard(done)
         return task, _get_reply(done)
 
     def close(self) -> None:
         """Give back what is not done and leave the cluster."""
         with contextlib.suppress(Exception):
-            self._client.cancel(
-                [future for _, future in self._out.values() if future is not None], force=True
-            )
-        self._disconnect()
-
-    def _disconnect(self) -> None:
+            self._client.cancel(list(self._out), force=True)
         with contextlib.suppress(Exception):
             self._client.close(timeout=2.0)
 
-    def _connect(self, patience: float) -> Any:
-        deadline = monotonic() + patience
-        while True:
-            try:
-                return self._distributed.Client(
-                    self._scheduler, timeout=min(patience, _FIRST_CONTACT), set_as_default=False
-                )
-            except (OSError, TimeoutError, ValueError) as fault:
-                if monotonic() > deadline or isinstance(fault, ValueError):
-                    raise SchedulerError(
-                        f"no Dask scheduler answers within {patience:g} s",
-                        "start it, or check the address; the same command goes on from here",
-                        Where(file=self._scheduler),
-                    ) from None
-                sleep(_PAUSE)
-
-    def _reconnect(self) -> None:
-        """Wait for a scheduler, and submit all tasks in flight again."""
-        self._tell(Noted(f"lost the scheduler at {self._scheduler}; waiting for it"))
-        self._disconnect()
-        self._client = self._connect(self._patience)
-        for number in self._out:
-            self._replies.put((number, ConnectionError()))
-        self._threads = 0
-        self._tell(Noted("the scheduler is back"))
+    def _make_absence_error(self) -> SchedulerError:
+        return SchedulerError(
+            "no Dask scheduler answers",
+            "start it, or check the address; the same command goes on from here",
+            Where(file=self._scheduler),
+        )
 
 
 def _import_distributed_quietly(address: str) -> Any:

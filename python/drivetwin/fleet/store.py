@@ -59,9 +59,6 @@ ONE_FILE_EACH = (
 the old path of a moved file, and a log stored at two places counts once.
 """
 
-RUN_COLUMNS = frozenset({"attempts", "seconds", "modified", "run"})
-"""Columns that describe the runs, not the logs; they differ between equal results."""
-
 
 @dataclass(frozen=True)
 class FileRow:
@@ -130,10 +127,6 @@ class Index:
         with self._convert_errors():
             cursor = self._db.execute(sql)
             return [column[0] for column in cursor.description], cursor.fetchall()
-
-    def list_columns(self, table: str) -> list[str]:
-        """Names of a table's columns."""
-        return [row[1] for row in self.select(f"PRAGMA table_info({table})")]
 
     def get_file(self, path: str) -> FileRow | None:
         """The file as last seen, None for a new one."""
@@ -412,13 +405,6 @@ class Store:
         tables = [parts.read_rows(path, kinds) for path in self.list_parts()]
         whole = pa.concat_tables([make_schema().empty_table(), *tables])
         return whole.take(pc.sort_indices(whole.column("log")))
-
-    def read_table(self, name: str) -> list[dict[str, Any]]:
-        """Read the rows of an index table by its key, without the columns on runs."""
-        columns = [column for column in self.index.list_columns(name) if column not in RUN_COLUMNS]
-        listed = ", ".join(f'"{column}"' for column in columns)
-        rows = self.index.select(f"SELECT {listed} FROM {name} ORDER BY 1, 2")
-        return [dict(zip(columns, row, strict=True)) for row in rows]
 
     @contextmanager
     def _convert_disk_errors(self) -> Iterator[None]:

@@ -129,16 +129,12 @@ Column = str | tuple[str, str] | tuple[str, str, str] | Cell
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A titled part of the report; `anchor` is its address in the page.
-
-    `collapsed` sections are closed until the reader opens them, and are not printed.
-    """
+    """A titled part of the report; `anchor` is its address in the page."""
 
     anchor: str
     title: str
     intro: str
     blocks: Sequence[Block]
-    collapsed: bool = False
 
     @property
     def short(self) -> bool:

@@ -309,7 +309,6 @@ def make_subplots(
     heights: Sequence[float] = (1.0,),
     *,
     gaps: tuple[float, float] = (0.1, 0.0),
-    tall: Sequence[tuple[int, int]] = (),
     titles: Sequence[str] = (),
 ) -> Figure:
     """Return a figure of several panels.
@@ -320,24 +319,15 @@ def make_subplots(
         Relative sizes of columns and rows, from the left and from the top.
     gaps : tuple of float
         Space between columns and between rows, as shares of the figure.
-    tall : sequence of (row, column)
-        Cells that reach down to the last row.
     titles : sequence of str
         Texts above the cells, row by row.
     """
     across, down = _divide(widths, gaps[0]), _divide(heights, gaps[1])
-    columns = dict(tall_cell[::-1] for tall_cell in tall)
-    cells = [
-        (row, column)
-        for row in range(1, len(down) + 1)
-        for column in range(1, len(across) + 1)
-        if row <= columns.get(column, row)
-    ]
+    cells = [(row, col) for row in range(1, len(down) + 1) for col in range(1, len(across) + 1)]
     suffixes = {cell: str(k) if k > 1 else "" for k, cell in enumerate(cells, start=1)}
     layout: dict[str, Any] = {"annotations": []}
     for k, ((row, column), suffix) in enumerate(suffixes.items()):
-        last = len(down) if (row, column) in tall else row
-        rows = [1.0 - down[last - 1][1], 1.0 - down[row - 1][0]]
+        rows = [1.0 - down[row - 1][1], 1.0 - down[row - 1][0]]
         layout[f"xaxis{suffix}"] = {"anchor": f"y{suffix}", "domain": list(across[column - 1])}
         layout[f"yaxis{suffix}"] = {"anchor": f"x{suffix}", "domain": rows}
         if k < len(titles):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The report: one HTML file that opens offline and contains plotly.js once, compressed.
 
-All samples of its time figures stand in it, each array once. An array becomes whole numbers of a
-step, their differences with the sign in the lowest bit, the low and the high bytes of these apart,
-and all of that gzip. The step of values is a sixteenth of their own noise, or 2⁻¹⁶ of their span
-where they have less noise than that: no eye and no zoom sees it. Times on an even grid are three
-numbers. The script of the page, `templates/report.js`, reads it.
+All samples of its time figures stand in it, each array once, as whole numbers of a step, their
+differences in two bytes, and all of that gzip. The step of values is a sixteenth of their own
+noise, or 2⁻¹⁶ of their span where they have less noise than that: no eye and no zoom sees it.
+Times on an even grid are three numbers, other times have eight bytes. The script of the page,
+`templates/report.js`, reads it.
 """
 
 from __future__ import annotations
@@ -31,13 +31,29 @@ from drivetwin._util.progress import TimedStages, notify_progress
 from drivetwin._util.text import escape_text
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.estimation.identification import Identification, Several
-from drivetwin.report.blocks import Block, FigureBlock, Page, Section, build_findings_section
+from drivetwin.report.blocks import (
+    Block,
+    FigureBlock,
+    Page,
+    Section,
+    TextBlock,
+    build_findings_section,
+)
 from drivetwin.report.figure import Entry, encode_entries
-from drivetwin.report.sections.parameters import build_limits_section, build_result_section
+from drivetwin.report.model_verdict import build_verdict_block, explain_identification
+from drivetwin.report.sections.parameters import (
+    build_limits_section,
+    build_parameter_blocks,
+    build_result_section,
+    build_suggestion_blocks,
+)
 from drivetwin.report.sections.stage_results import build_stage_sections
 from drivetwin.report.sections.summary import (
     build_actuator_section,
+    build_fit_table,
     build_friction_section,
+    build_friction_table,
+    build_phase_table,
     build_provenance_section,
     build_shift_section,
     build_validation_section,
@@ -45,11 +61,16 @@ from drivetwin.report.sections.summary import (
 from drivetwin.report.sections.together import (
     build_holdout_section,
     build_joint_section,
+    build_judgement_blocks,
+    build_log_table,
     prefix_log_section,
 )
+from drivetwin.shifts.shift import Shift, make_shift_labels
 
 NOISE_PARTS = 16.0
-SPAN_PARTS = 65536.0
+SPAN_PARTS = 65534.0
+GAP = 65535
+"""Code of a sample that is not finite."""
 _COMPRESSION = 4
 """Level of gzip: the highest takes twice the time for four parts in a hundred."""
 EVEN = 0.01
@@ -62,67 +83,42 @@ class Store:
 
     index: list[dict[str, Any]] = field(default_factory=list)
     _bytes: list[bytes] = field(default_factory=list)
-    _known: dict[bytes, int] = field(default_factory=dict)
+    _known: dict[object, int] = field(default_factory=dict)
 
     def add_time(self, time: FloatArray) -> int:
         """Number of a time base (n,), increasing [s]."""
-        return self._add(
-            time,
-            (EVEN * float(np.median(np.diff(time))) if time.size > 1 else 1.0),
-            even=_is_even(time),
-        )
+        if not _is_even(time):
+            return self._add({"count": time.size, "width": 8}, time.astype("<f8").tobytes())
+        step = float(time[-1] - time[0]) / (time.size - 1)
+        return self._add({"count": time.size, "start": float(time[0]), "step": step})
 
     def add_values(self, values: FloatArray) -> int:
         """Number of an array (n,); samples that are not finite are gaps."""
-        return self._add(values, _choose_value_step(values), even=False)
+        known = np.isfinite(values)
+        start = float(values.min(initial=np.inf, where=known)) if known.any() else 0.0
+        step = _choose_value_step(values[known])
+        codes = np.full(values.size, GAP, "<u2")
+        codes[known] = np.round((values[known] - start) / step)
+        entry = {"count": values.size, "width": 2, "start": start, "step": step}
+        return self._add(entry, np.diff(codes, prepend=codes.dtype.type(0)).tobytes())
 
     def encode(self) -> str:
         """All bytes as base64 of gzip; equal stores give equal texts."""
         return encode_content(b"".join(self._bytes))
 
-    def _add(self, values: FloatArray, step: float, *, even: bool) -> int:
-        key = values.tobytes() + bytes([even])
-        if key in self._known:
-            return self._known[key]
-        entry: dict[str, Any] = {"count": int(values.size)}
-        if even:
-            first, last = float(values[0]), float(values[-1])
-            entry |= {"start": first, "step": (last - first) / max(values.size - 1, 1)}
-        elif values.size:
-            entry |= self._encode_values(values, step)
-        self.index.append(entry)
-        self._known[key] = len(self.index) - 1
+    def _add(self, entry: dict[str, Any], content: bytes = b"") -> int:
+        key = (*entry.values(), content)
+        if key not in self._known:
+            self._known[key] = len(self.index)
+            self.index.append(entry)
+            self._bytes.append(content)
         return self._known[key]
-
-    def _encode_values(self, values: FloatArray, step: float) -> dict[str, Any]:
-        """Append the differences of whole steps; what it takes to undo that."""
-        finite = np.isfinite(values)
-        start = float(values[finite][0]) if finite.any() else 0.0
-        codes = np.round((_fill_gaps(values, finite, start) - start) / step).astype(np.int64)
-        change = np.diff(codes, prepend=0)
-        folded = np.where(change < 0, -2 * change - 1, 2 * change)
-        width = 2 if int(folded.max()) < 1 << 16 else 4
-        planes = folded.astype(f"<u{width}").view(np.uint8)
-        self._bytes.append(planes.reshape(-1, width).T.tobytes())
-        return {"start": start, "step": step, "width": width, "gaps": _find_gaps(finite)}
 
 
 def encode_content(content: bytes) -> str:
     """Base64 of gzip; equal contents give equal texts."""
     packed = gzip.compress(content, _COMPRESSION, mtime=0)
     return base64.b64encode(packed).decode("ascii")
-
-
-def _fill_gaps(values: FloatArray, finite: np.typing.NDArray[np.bool_], start: float) -> FloatArray:
-    """The array with each gap held at the sample before it."""
-    last = np.maximum.accumulate(np.where(finite, np.arange(values.size), -1))
-    return np.where(last >= 0, values[np.maximum(last, 0)], start)
-
-
-def _find_gaps(finite: np.typing.NDArray[np.bool_]) -> list[list[int]]:
-    """First and one past the last index of each stretch without a sample."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([True], finite, [True])).astype(np.int8)))
-    return [[int(first), int(last)] for first, last in edges.reshape(-1, 2)]
 
 
 def _is_even(time: FloatArray) -> bool:
@@ -132,14 +128,13 @@ def _is_even(time: FloatArray) -> bool:
     return bool(np.abs(time - grid).max() <= EVEN * (grid[1] - grid[0]))
 
 
-def _choose_value_step(values: FloatArray) -> float:
-    """Rounding that is small against the noise of the samples, and never below what float32 has."""
-    known = values[np.isfinite(values)]
+def _choose_value_step(known: FloatArray) -> float:
+    """Rounding of finite samples that is small against their noise."""
+    noise = 0.0
+    if known.size >= 4:
+        noise = float(np.median(np.abs(np.diff(known, 2)))) / (0.6745 * np.sqrt(6.0))
     span = float(np.ptp(known)) if known.size else 0.0
-    if known.size < 4 or span / SPAN_PARTS == 0.0:  # of subnormal numbers the quotient is zero too
-        return max(span / SPAN_PARTS, 1e-12)
-    noise = float(np.median(np.abs(np.diff(known, 2)))) / (0.6745 * np.sqrt(6.0))
-    return float(max(noise / NOISE_PARTS, span / SPAN_PARTS))
+    return max(noise / NOISE_PARTS, span / SPAN_PARTS, 1e-12)
 
 
 _BELOW_BUTTONS = 30
@@ -153,36 +148,22 @@ PAGE = TimedStages("page", ("sections", "figures"))
 @check_arguments
 def save_report(path: Path | str, found: Identification, log: ShiftLog) -> None:
     """Write the report of an identification; the file appears whole or not at all."""
-    save_page(path, build_report_page(found, log))
-
-
-def build_report_page(found: Identification, log: ShiftLog) -> Page:
-    """Build the report of an identification."""
-    with PAGE.enter("sections"):
-        sections = build_report_sections(found, log)
-    shifts = ", ".join(shift.name for shift in found.shifts)
-    return Page(
-        title=f"Driveline model from {Path(log.source).name}",
-        subtitle=f"shift {shifts} · method {found.method.value} · loss law {found.loss_law}",
-        sections=sections,
-    )
+    save_page(path, build_report_page(found, [log]))
 
 
 def build_report_sections(found: Identification, log: ShiftLog) -> list[Section]:
     """All sections in reading order; some may be without content."""
-    stages = build_stage_sections(found)
     return [
         build_result_section(found),
         build_findings_section(found.findings),
         build_validation_section(found.evidence.validation),
         build_shift_section(found, log),
-        *(one for one in stages if not one.collapsed),
+        *build_stage_sections(found),
         build_friction_section(found),
         build_actuator_section(found),
         *_build_likelihood_sections(found),
         build_limits_section(found),
         build_provenance_section(found),
-        *(one for one in stages if one.collapsed),
     ]
 
 
@@ -195,33 +176,25 @@ def _build_likelihood_sections(found: Identification) -> list[Section]:
     return build_likelihood_sections(found)
 
 
-def build_joint_page(found: Identification, logs: Sequence[ShiftLog]) -> Page:
-    """Build the report of a joint identification; `logs` are those fitted, in order."""
-    several = found.evidence.several
-    held = found.evidence.held_out
+def build_report_page(found: Identification, logs: Sequence[ShiftLog]) -> Page:
+    """Build the report of an identification; `logs` are those fitted, in order."""
+    several, held = found.evidence.several, found.evidence.held_out
+    shifts = f"shift {', '.join(shift.name for shift in found.shifts)}"
     with PAGE.enter("sections"):
         if several is None:
             sections = build_report_sections(found, logs[0])
         else:
+            shifts = f"{len(found.shifts)} shifts"
             sections = list(_build_joint_sections(found, several, logs))
     if held:
+        shifts += f", {len(held)} more predicted"
         place = sum(section.anchor in _OPENING for section in sections)
         sections.insert(place, build_holdout_section(found, held))
-    names = " and ".join(Path(log.source).name for log in logs)
-    predicted = f" · {_format_shift_count(len(held))} predicted" if held else ""
     return Page(
-        title=f"Driveline model from {names}",
-        subtitle=(
-            f"{_format_shift_count(len(found.shifts))} fitted{predicted} · method "
-            f"{found.method.value} · "
-            f"loss law {found.loss_law}"
-        ),
+        title=f"Driveline model from {' and '.join(Path(log.source).name for log in logs)}",
+        subtitle=f"{shifts} · method {found.method.value} · loss law {found.loss_law}",
         sections=sections,
     )
-
-
-def _format_shift_count(count: int) -> str:
-    return "1 shift" if count == 1 else f"{count} shifts"
 
 
 def _build_joint_sections(
@@ -242,6 +215,39 @@ def _build_joint_sections(
     yield from _build_likelihood_sections(found)
     yield build_limits_section(found)
     yield build_provenance_section(found)
+
+
+def build_identification_blocks(found: Identification) -> list[Block]:
+    """Verdict, phases, parameters, friction, suggestions, fits, and the findings at the end."""
+    evidence = found.evidence
+    blocks: list[Block] = [build_verdict_block(explain_identification(found))]
+    blocks += [build_phase_table(*one) for one in _label_shifts(found)]
+    blocks += build_parameter_blocks(found.estimates)
+    if found.friction:
+        blocks.append(build_friction_table(found.friction))
+    if evidence.suggestions:
+        blocks += build_suggestion_blocks(evidence.suggestions, found.estimates)
+    if evidence.several is not None:
+        blocks += [
+            build_log_table(found, evidence.several),
+            TextBlock(evidence.several.consistency.text),
+        ]
+    elif found.fit:
+        blocks.append(build_fit_table(found.fit))
+    if evidence.held_out:
+        blocks += build_judgement_blocks(found, evidence.held_out)
+    return [*blocks, *build_findings_section(found.findings).blocks]
+
+
+def _label_shifts(found: Identification) -> Iterator[tuple[str, Shift]]:
+    """Yield the shifts that were fitted with their labels, of several logs with the file too."""
+    several = found.evidence.several
+    if several is None:
+        yield from zip(make_shift_labels(found.shifts), found.shifts, strict=True)
+        return
+    for log in several.logs:
+        for label, shift in zip(make_shift_labels(log.shifts), log.shifts, strict=True):
+            yield f"{label} in {Path(log.source).name}", shift
 
 
 def save_page(path: Path | str, page: Page, library: str | None = None) -> None:

@@ -346,8 +346,8 @@ def _attach_simulations(
     """The identification with the fit over all logs, each with what it has of its own."""
     several = found.evidence.several
     if several is None:
-        twin = build_twin(found, card)
-        return attach_validation(found, twin, logs[0]), {logs[0].source: twin}
+        found = attach_validation(found, build_twin(found, card), logs[0])
+        return found, {logs[0].source: build_twin(found, card)}  # with the verdicts of the gate
     twins, views = {}, []
     for share, log in zip(several.logs, logs, strict=True):
         mine = extract_log(replace(found, findings=()), share)

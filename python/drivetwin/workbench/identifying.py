@@ -222,12 +222,9 @@ def emit_report(
     emit: Emit, found: Identification | BusOutcome, logs: Sequence[ShiftLog] = ()
 ) -> None:
     """Emit the report of a result as HTML; `logs` are those fitted, in order."""
-    from drivetwin.report.html import build_joint_page, build_report_page, render_page
+    from drivetwin.report.html import build_report_page, render_page
 
-    if not isinstance(found, Identification):
-        page = found.build_page()
-    elif len(logs) == 1 and not found.evidence.held_out:
-        page = build_report_page(found, logs[0])
+    if isinstance(found, BusOutcome):
+        emit(render_page(found.build_page()))
     else:
-        page = build_joint_page(found, logs)
-    emit(render_page(page))
+        emit(render_page(build_report_page(found, logs)))

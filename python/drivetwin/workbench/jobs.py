@@ -29,11 +29,7 @@ Emit = Callable[[object], None]
 Work = Callable[..., None]
 """A function of a module: called as work(emit, *arguments) in the child."""
 
-_PRELOADED = [
-    "drivetwin.workbench.sandboxed_parse",
-    "drivetwin.workbench.identifying",
-    "drivetwin.workbench.workspace",
-]
+_PRELOADED = ["drivetwin.workbench.sandboxed_parse", "drivetwin.workbench.identifying"]
 _PATIENCE = 2.0
 """Time [s] that a process may take to end after the request."""
 _PAUSE = 0.1

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Any, Concatenate, ParamSpec, TypeVar
 
 from drivetwin._util.atomic import write_text
-from drivetwin.authoring.card_text import EntryPath, refuse_faults, replace_numbers
+from drivetwin.authoring.card_text import refuse_faults
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.question import Key
 from drivetwin.channels.mapping_file import find_project_mapping
@@ -24,10 +24,9 @@ from drivetwin.errors import InputError, RefusedError, Where
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.report.figure import Figure
-from drivetwin.vehicle.locks import Lock
 from drivetwin.workbench import jobs, sandboxed_parse, what_if, workspace
 from drivetwin.workbench.forms import CardForm, Corrections, Entry, apply_entries
-from drivetwin.workbench.identifying import Boundary, Task, identify_bus_logs, identify_logs
+from drivetwin.workbench.identifying import Task, identify_bus_logs, identify_logs
 from drivetwin.workbench.sandboxed_parse import ColumnKey, Preview, make_column_key
 from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
 from drivetwin.workbench.what_if import View
@@ -38,6 +37,10 @@ MOST_UPLOADS = 8
 
 Above `MOST_LOGS`, as all logs and the card may be uploads.
 """
+
+
+CARD_TEXT: Key = ("text",)
+"""Key of the text of an edited card."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,21 +141,9 @@ class Session:
         self._set(replace(work, logs=(*work.logs, fresh)).drop_results())
 
     @_hold_lock
-    def remove_log(self, index: int) -> None:
-        """Close one of several logs. Raises InputError."""
-        work = self.work.remove_log(index)
-        self.cancel()
-        self._set(work)
-
-    @_hold_lock
-    def select_log(self, index: int) -> None:
-        """Select the log that the views show. Raises InputError."""
-        self._set(self.work.select_log(index))
-
-    @_hold_lock
-    def hold_out(self, held: Sequence[frozenset[int]]) -> None:
-        """Set the indices of the shifts to predict, log by log. Raises InputError."""
-        self.work = self.work.hold_out(held)
+    def update(self, change: Callable[[SessionState], SessionState]) -> None:
+        """Change the state. Raises what the change raises; the state stays as it was then."""
+        self._set(change(self.work))
 
     @_hold_lock
     def open_card(self, card: Source) -> None:
@@ -214,11 +205,14 @@ class Session:
 
     @_hold_lock
     def write_edited_card(
-        self, name: str, numbers: Mapping[EntryPath, str], *, can_replace: bool
+        self, name: str, texts: Mapping[Key, str], *, can_replace: bool
     ) -> Source:
-        """Write the open card with other numbers into the folder; see `write_card`."""
+        """Write the text of a card under CARD_TEXT into the folder; see `write_card`.
+
+        Raises CardError with all faults of the text.
+        """
         path = self.folder.make_new_path(name, ".toml")
-        text = replace_numbers(self.read_card_text(), numbers)
+        text = texts.get(CARD_TEXT, "")
         refuse_faults(text, path.name)
         return self._write_text(path, text, can_replace)
 
@@ -239,16 +233,6 @@ class Session:
         fresh = self._read_log(one.source, self.work.card, one.mapping, corrections)
         self.cancel()
         self._set(self.work.set_log(fresh))
-
-    @_hold_lock
-    def move_boundaries(self, index: int, changes: Mapping[Boundary, float]) -> None:
-        """Set boundaries of a shift of the selected log; none: as detected. Raises InputError."""
-        self._set(self.work.apply_moves(index, changes))
-
-    @_hold_lock
-    def set_lock(self, parameter_id: str, lock: Lock) -> None:
-        """Lock a parameter for the next identification. Raises InputError."""
-        self.work = self.work.set_lock(parameter_id, lock)
 
     @_hold_lock
     def identify(self, *, is_quick: bool = False) -> None:
@@ -293,18 +277,6 @@ class Session:
             self.job = None
 
     @_hold_lock
-    def choose_shift(self, index: int) -> None:
-        """Select another shift of the log. Raises InputError if it does not exist."""
-        if not 0 <= index < len(self.work.shifts):
-            raise InputError("there is no such shift", "choose one that is listed")
-        self._set(replace(self.work, shift=index, changes={}))
-
-    @_hold_lock
-    def reset_sliders(self) -> None:
-        """Set all sliders to the identified values."""
-        self._set(replace(self.work, changes={}))
-
-    @_hold_lock
     def set_view(self, view: View) -> bool:
         """Note the time window that was zoomed to.
 
@@ -342,11 +314,6 @@ class Session:
         self.work = replace(work, changes=dict(changes))
         self.live = replace(live, present=present)
         return what_if.collect_changed_curves(live.figure, present, self.view)
-
-    @_hold_lock
-    def note_export(self) -> None:
-        """Record that the result was exported."""
-        self.work = replace(self.work, has_exported=True)
 
     @_hold_lock
     def save(self, name: str) -> str:

@@ -142,6 +142,12 @@ class SessionState:
             raise InputError("there is no such log", "choose one that is listed")
         return replace(self, at=index, shift=0, changes={})
 
+    def select_shift(self, index: int) -> SessionState:
+        """Select another shift of the log. Raises InputError if it does not exist."""
+        if not 0 <= index < len(self.shifts):
+            raise InputError("there is no such shift", "choose one that is listed")
+        return replace(self, shift=index, changes={})
+
     def remove_log(self, index: int) -> SessionState:
         """Close one of several logs; results no longer hold. Raises InputError."""
         if not 0 <= index < len(self.logs) or len(self.logs) == 1:

@@ -8,7 +8,6 @@ its own (see `sandboxed_parse.py`).
 
 from __future__ import annotations
 
-import mmap
 import os
 import re
 import unicodedata
@@ -26,9 +25,7 @@ from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
 from drivetwin.errors import RefusedError, Where
 from drivetwin.files.twin_file import TwinFile, build_twin_file, restore_twin
-from drivetwin.logs.formats.guarded import compute_parser_limits
 from drivetwin.vehicle.locks import Lock
-from drivetwin.workbench import jobs
 from drivetwin.workbench.forms import Corrections
 from drivetwin.workbench.identifying import Boundary, Outcome
 from drivetwin.workbench.session_state import MOST_LOGS, OpenLog, SessionState, Source
@@ -41,14 +38,6 @@ LIMITS = {
 """Bytes that an upload may have, by what it is for."""
 _CHUNK = 2**18
 _LONGEST_NAME = 200
-_SIGN = rb"""[+-](?!(?i:nan|inf|infinity)\b)(?=[A-Za-z(]|[^,;\t\r\n"]*[|!(])"""
-_FORMULA = re.compile(rb"""(?:^|[,;\t])[ ]*"?(?:[=@]|""" + _SIGN + rb")", re.MULTILINE)
-"""A cell that a spreadsheet would compute: it begins with =, @, or a sign before no number.
-
-An apostrophe in front makes it a text. The time of a search is proportional to the size of the
-file: no part goes beyond its cell.
-"""
-_HEAD = 4096
 
 
 def make_label(name: str) -> str:
@@ -72,7 +61,7 @@ def store_stream(
     """Write at most `limit` bytes of `stream` to `target`; delete the file if it is refused.
 
     `claimed` is the length that the browser states, None where it states none.
-    Raises RefusedError for a bad name, too many bytes, claimed or sent, none at all, and formulas.
+    Raises RefusedError for a bad name, too many bytes, claimed or sent, and for none at all.
     """
     label = make_label(name)
     if claimed is not None and claimed > limit:
@@ -88,36 +77,10 @@ def store_stream(
             raise RefusedError(
                 f"{size} of {claimed} bytes arrived", "upload the file again", Where(file=label)
             )
-        refuse_formulas(target, label)
     except BaseException:
         target.unlink(missing_ok=True)
         raise
     return Source(label, target, uploaded=True)
-
-
-def refuse_formulas(path: Path, label: str) -> None:
-    """Refuse a text file with cells that a spreadsheet would compute: no logger writes them.
-
-    They would run where a name or a value of the log is later opened as a table. The search runs in
-    a separate process, because the server could not answer other requests meanwhile.
-    """
-    with path.open("rb") as file:
-        if b"\0" in file.read(_HEAD):
-            return
-    number = jobs.call(find_formula, path, limit=compute_parser_limits(path).seconds)
-    if number is not None:
-        raise RefusedError(
-            f"line {number} holds a cell that is a formula",
-            "export the log as plain numbers, without formulas",
-            Where(file=label),
-        )
-
-
-def find_formula(emit: jobs.Emit, path: Path) -> None:
-    """Emit the number of the first line with a formula in a file that is not empty, or None."""
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        found = _FORMULA.search(content)
-        emit(None if found is None else 1 + content[: found.end()].count(b"\n"))
 
 
 def _copy(stream: IO[bytes], file: IO[bytes], limit: int) -> int:

@@ -106,7 +106,6 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
     several = Several(shares, tested)
     evidence = StageResults(
         signals=tuple(signals),
-        paper=tuple(one for each in alone for one in each.evidence.paper),
         likelihood=fit,
         loads=joint.loads,
         cause=joint.cause,

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from drivetwin._util.display_units import NM
 from drivetwin.estimation.direct.ringdown import RingDown
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.paper.pipeline import GridFit, PaperShift
-from drivetwin.estimation.result.method import Method
 from drivetwin.findings import render
 from drivetwin.report.blocks import (
     Block,
@@ -161,26 +160,8 @@ class _Stages:
 
 
 def build_stage_sections(found: Identification) -> list[Section]:
-    """Evidence of the paper's method by question, collapsed beside the likelihood's result.
-
-    The questions are inertia and efficiency, load, and output shaft.
-    """
-    sections = _build_sections(_collect_stages(found))
-    if found.method is Method.PAPER:
-        return sections
-    return [
-        replace(
-            one,
-            anchor=f"appendix-{one.anchor}",
-            title=f"Appendix: {one.title[0].lower()}{one.title[1:]}",
-            intro=f"Evidence of the paper's method, for comparison. {one.intro}",
-            collapsed=True,
-        )
-        for one in sections
-    ]
-
-
-def _build_sections(paper: Sequence[_Stages]) -> list[Section]:
+    """Evidence of the paper's method by question: inertia and efficiency, load, output shaft."""
+    paper = _collect_stages(found)
     return [
         Section(
             "inertia",

@@ -28,25 +28,19 @@
     document.head.append(script);
   }
 
-  /* All samples of the time figures; packing.py says how they are written. */
+  /* All samples of the time figures; html.py says how they are written. */
   async function loadSamples() {
-    const index = embedded("samples-index");
-    const bytes = new Uint8Array(await unpacked("samples"));
+    const bytes = await unpacked("samples");
     let place = 0;
-    return index.map((entry) => {
-      const values = new Float64Array(entry.count);
-      if (!entry.width) return values.map((_, i) => entry.start + entry.step * i);
-      const n = entry.count;
+    return embedded("samples-index").map(({ count, width, start, step }) => {
+      if (!width) return Float64Array.from({ length: count }, (_, i) => start + step * i);
+      const part = bytes.slice(place, (place += width * count));
+      if (width === 8) return new Float64Array(part);
       let code = 0;
-      for (let i = 0; i < n; i++) {
-        let folded = 0;
-        for (let k = 0; k < entry.width; k++) folded += bytes[place + k * n + i] * 256 ** k;
-        code += folded % 2 ? -(folded + 1) / 2 : folded / 2;
-        values[i] = entry.start + entry.step * code;
-      }
-      place += entry.width * n;
-      entry.gaps.forEach(([first, last]) => values.fill(NaN, first, last));
-      return values;
+      return Float64Array.from(new Uint16Array(part), (change) => {
+        code = (code + change) & 65535;
+        return code === 65535 ? NaN : start + step * code;
+      });
     });
   }
 
@@ -256,26 +250,6 @@
     });
   }
 
-  /* Figures of a closed appendix have no width: they are drawn when it opens. */
-  function drawWhenOpened(samples) {
-    document.querySelectorAll("details").forEach((part) => {
-      part.addEventListener("toggle", async () => {
-        if (part.open) await drawAll(part.querySelectorAll(".plot"), samples);
-      });
-    });
-    const open = () => {
-      const part = location.hash && element(decodeURIComponent(location.hash.slice(1)));
-      if (part && part.tagName === "DETAILS") part.open = true;
-    };
-    window.addEventListener("hashchange", open);
-    open();
-  }
-
-  async function drawAll(found, samples) {
-    for (const plot of found) if (!plots.includes(plot)) await draw(plot, samples);
-    paint(dark.matches);
-  }
-
   /* The section in view is marked in the navigation. */
   function markSections() {
     const links = new Map();
@@ -294,9 +268,8 @@
   async function start() {
     markSections();
     const [samples] = await Promise.all([loadSamples(), loadLibrary()]);
-    const shown = [...document.querySelectorAll(".plot")].filter((plot) => !plot.closest("details:not([open])"));
-    await drawAll(shown, samples);
-    drawWhenOpened(samples);
+    for (const plot of document.querySelectorAll(".plot")) await draw(plot, samples);
+    paint(dark.matches);
     dark.addEventListener("change", (event) => paint(event.matches));
     prepareForPaper();
     document.body.dataset.drawn = "all";

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Card: open the vehicle card, edit its numbers, or answer the questions of a new one."""
+"""Card: open the vehicle card, edit its text, or answer the questions of a new one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from dash import ALL, Input, Output, State, ctx, dcc, html, no_update
 from dash.development.base_component import Component
 from pydantic import TypeAdapter, ValidationError
 
-from drivetwin.authoring.card_text import EntryPath, format_path, list_numbers
 from drivetwin.authoring.question import FormEntry, Key
 from drivetwin.errors import RefusedError
 from drivetwin.findings import render
@@ -22,7 +21,7 @@ from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.workbench.forms import CardForm
 from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
-from drivetwin.workbench.session import Session
+from drivetwin.workbench.session import CARD_TEXT, Session
 from drivetwin.workbench.session_state import Source
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import ControlId
@@ -214,35 +213,22 @@ def _build_entry(entry: FormEntry) -> Component:
 
 
 def _register_edit(page: ui.Page) -> None:
-    """Register the form for the numbers of the open card."""
+    """Register the form for the text of the open card."""
 
     @page.callback(Output("edit-content", "children"), Input(ui.make_due_id("card"), "data"))
     def show(session: Session, _: object) -> list[Component]:
-        """Draw the numbers of the open card."""
+        """Draw the text of the open card."""
         work = session.work
         if work.opened is None or work.opened.card is None or work.card is None:
             return []
-        return _build_edit_form(work.card.path.name, list_numbers(session.read_card_text()))
+        return _build_edit_form(work.card.path.name, session.read_card_text())
 
 
-def _build_edit_form(name: str, numbers: dict[EntryPath, str]) -> list[Component]:
-    fields = [
-        ui.make_field(
-            {"part": "entry", "id": json.dumps(path)},
-            format_path(path),
-            type="text",
-            value=text,
-            debounce=True,
-        )
-        for path, text in numbers.items()
-    ]
+def _build_edit_form(name: str, text: str) -> list[Component]:
+    area = dcc.Textarea(id={"part": "entry", "id": _name_key(CARD_TEXT)}, value=text)
     form = [
-        html.Summary("Edit the numbers of the open card"),
-        ui.make_hint(
-            "Keys and units are those of the file. A number is VALUE, VALUE+-STD with one standard "
-            "deviation, or LOW..HIGH. Comments and all other entries stay."
-        ),
-        html.Div(fields, className="entries"),
+        html.Summary("Edit the open card"),
+        html.Label([html.Span("Text of the card", className="label"), area], className="field"),
         build_writing("entry", "Name of the edited card", name, "Write and open the edited card"),
     ]
     return [html.Details(form, id="edit-form")]

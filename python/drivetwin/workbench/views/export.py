@@ -7,7 +7,7 @@ import base64
 import io
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import Enum, StrEnum
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -237,7 +237,7 @@ def register(page: ui.Page) -> None:
         wanted = _parse_choice(get_triggered_part("export"), choices)
         product = make_product(session.work, wanted, session.scratch)
         if wanted is not Record.MAPPING:
-            session.note_export()
+            session.update(lambda work: replace(work, has_exported=True))
             ui.notify_topic(ui.Topic.STEPS)
         ui.notify(f"{product.name}: {len(product.content) / 1e3:.0f} kB")
         content = base64.b64encode(product.content).decode()

@@ -88,7 +88,7 @@ def register(page: ui.Page) -> None:
         if _is_same(wanted, before):
             ui.notify("")
             return
-        session.set_lock(name, wanted)
+        session.update(lambda work: work.set_lock(name, wanted))
         if at == Place.SLIDER:
             ui.notify_topic(ui.Topic.LOCKS)
         ui.notify(f"{get_parameter_label(name)} is {wanted.kind.value} in the next identification")

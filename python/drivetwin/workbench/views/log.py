@@ -113,7 +113,7 @@ def register_log_choice(page: ui.Page, place: Place) -> None:
     def choose(session: Session, index: Index | None) -> None:
         """Show another log."""
         if index is not None and int(index) != session.work.at:
-            session.select_log(int(index))
+            session.update(lambda work: work.select_log(int(index)))
             ui.notify_topic(ui.Topic.SELECTION)
 
 
@@ -187,7 +187,8 @@ def _register_opening(page: ui.Page) -> None:
         """Close one of several logs."""
         if any(clicks):
             index = get_triggered_part("remove")
-            session.remove_log(int(index) if index.isdecimal() else -1)
+            session.cancel()
+            session.update(lambda work: work.remove_log(int(index) if index.isdecimal() else -1))
             ui.notify_topic(ui.Topic.LOG)
             ui.notify("The log is removed")
 

@@ -87,7 +87,7 @@ def _register_figure(page: ui.Page) -> None:
         moves = parse_drag(plot_phases(work.require_log(), work.require_shift()), change)
         ui.notify_topic(ui.Topic.PHASES)
         if moves:
-            session.move_boundaries(work.shift, moves)
+            session.update(lambda work: work.apply_moves(work.shift, moves))
             ui.notify("; ".join(f"{LABELS[one]} at {time:z.4f} s" for one, time in moves.items()))
 
 
@@ -109,7 +109,7 @@ def _register_uses(page: ui.Page) -> None:
         ]
         if not ids or held == [one.held for one in logs]:
             return
-        session.hold_out(held)
+        session.update(lambda work: work.hold_out(held))
         ui.notify_topic(ui.Topic.HELD)
         ui.notify(
             _describe_held_out(len(chosen), "shift" if session.work.ratios is None else "log")
@@ -137,7 +137,7 @@ def _register_fields(page: ui.Page) -> None:
         if not changes:
             ui.notify("No time was changed")
             return
-        session.move_boundaries(session.work.shift, changes)
+        session.update(lambda work: work.apply_moves(work.shift, changes))
         ui.notify_topic(ui.Topic.PHASES)
         ui.notify("The phases are set")
 
@@ -146,7 +146,7 @@ def _register_fields(page: ui.Page) -> None:
         """Back to what was detected."""
         if not clicks:
             return
-        session.move_boundaries(session.work.shift, {})
+        session.update(lambda work: work.apply_moves(work.shift, {}))
         ui.notify_topic(ui.Topic.PHASES)
         ui.notify("The phases are as detected")
 
@@ -154,7 +154,7 @@ def _register_fields(page: ui.Page) -> None:
     def choose(session: Session, shift: Index | None) -> None:
         """Another shift of the log."""
         if shift is not None and int(shift) != session.work.shift:
-            session.choose_shift(int(shift))
+            session.update(lambda work: work.select_shift(int(shift)))
             ui.notify_topic(ui.Topic.PHASES)
 
 
