@@ -18,6 +18,14 @@ from drivetwin.twin.build import build_twin
 from tests.report.sample import SHIFT, card, friction, identification, log
 
 
+def make_estimates(**values: tuple[float, float | None]) -> dict[str, Estimate]:
+    """Estimates of value and standard deviation, None without one."""
+    return {
+        key: Estimate(key, value, std, Verdict.IDENTIFIED, "likelihood")
+        for key, (value, std) in values.items()
+    }
+
+
 def make_candidate(name: str, **values: tuple[float, float | None]) -> Candidate:
     """A candidate with some parameters: value and standard deviation, None without one."""
     estimates = {
@@ -28,35 +36,35 @@ def make_candidate(name: str, **values: tuple[float, float | None]) -> Candidate
 
 
 def test_values_agree_within_their_uncertainty() -> None:
-    near = [make_candidate("a", eta=(0.90, 0.01)), make_candidate("b", eta=(0.92, 0.01))]
+    near = [make_estimates(eta=(0.90, 0.01)), make_estimates(eta=(0.92, 0.01))]
     (one,) = compare_estimates(near)
     assert one.apart == pytest.approx(0.02 / np.hypot(0.01, 0.01))
     assert one.agrees
     assert one.mean == pytest.approx(0.91)
-    far = [make_candidate("a", eta=(0.90, 0.001)), make_candidate("b", eta=(0.92, 0.001))]
+    far = [make_estimates(eta=(0.90, 0.001)), make_estimates(eta=(0.92, 0.001))]
     assert compare_estimates(far)[0].agrees is False
-    alone = [make_candidate("a", eta=(0.9, 0.01), k_o=(1e5, 1e3)), make_candidate("b")]
+    alone = [make_estimates(eta=(0.9, 0.01), k_o=(1e5, 1e3)), make_estimates()]
     assert [one.agrees for one in compare_estimates(alone)] == [None, None]
-    refused = replace(near[0].estimates["eta"], value=None)
-    assert compare_estimates([replace(near[0], estimates={"eta": refused})]) == []
+    refused = replace(near[0]["eta"], value=None)
+    assert compare_estimates([{"eta": refused}]) == []
 
 
 def test_a_value_without_an_interval_is_held_against_those_of_the_others() -> None:
-    pair = [make_candidate("a", J3=(6059.7, 8.8)), make_candidate("b", J3=(6059.6, 8.8))]
-    (far,) = compare_estimates([*pair, make_candidate("paper", J3=(6295.0, None))])
+    pair = [make_estimates(J3=(6059.7, 8.8)), make_estimates(J3=(6059.6, 8.8))]
+    (far,) = compare_estimates([*pair, make_estimates(J3=(6295.0, None))])
     assert far.apart == pytest.approx((6295.0 - 6059.6) / 8.8)
     assert (far.agrees, far.bare) == (False, (2,))
-    (near,) = compare_estimates([pair[0], make_candidate("paper", J3=(6070.0, None))])
+    (near,) = compare_estimates([pair[0], make_estimates(J3=(6070.0, None))])
     assert near.agrees
     assert near.mean == pytest.approx(6059.7)
-    bare = [make_candidate("a", J3=(6000.0, None)), make_candidate("b", J3=(6295.0, None))]
+    bare = [make_estimates(J3=(6000.0, None)), make_estimates(J3=(6295.0, None))]
     (one,) = compare_estimates(bare)
     assert (one.agrees, one.bare) == (None, (0, 1))
 
 
 @given(st.lists(st.tuples(st.floats(0.1, 1e6), st.floats(1e-6, 1e3)), min_size=2, max_size=6))
 def test_the_mean_lies_between_the_values(values: list[tuple[float, float]]) -> None:
-    (one,) = compare_estimates([make_candidate(str(k), k_o=v) for k, v in enumerate(values)])
+    (one,) = compare_estimates([make_estimates(k_o=v) for k, v in enumerate(values)])
     stated = [value for value, _ in values]
     assert min(stated) * (1 - 1e-9) <= one.mean <= max(stated) * (1 + 1e-9)
     assert one.apart is not None

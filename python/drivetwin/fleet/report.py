@@ -46,7 +46,7 @@ from drivetwin.report.blocks import (
     make_badge,
     make_notes,
     make_number,
-    make_table,
+    make_tables,
 )
 from drivetwin.report.figure import get_parameter_label
 from drivetwin.report.figures.validation import plot_friction
@@ -120,12 +120,10 @@ def _build_overview(store: Store) -> Section:
         "SELECT error, count(*) AS n, min(what) FROM files JOIN logs USING (log) "
         "WHERE error != '' GROUP BY error ORDER BY n DESC"
     )
-    rows = list(store.index.select(sql))
-    blocks: list[Block] = [TilesBlock(tiles)]
-    if rows:
-        columns = ("reason", ("logs", "d"), "for example")
-        blocks.append(make_table("Why logs failed.", columns, rows))
-    return Section("fleet", "The fleet", "What was there, and what became of it.", blocks)
+    rows = store.index.select(sql)
+    reasons = make_tables("Why logs failed.", ("reason", ("logs", "d"), "for example"), rows)
+    intro = "What was there, and what became of it."
+    return Section("fleet", "The fleet", intro, [TilesBlock(tiles), *reasons])
 
 
 _SHIFTS = "SELECT count(*) FROM shifts WHERE state = 'used' AND log IN (SELECT log FROM files)"
@@ -151,9 +149,7 @@ def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[
         *("parameter", ("logs", "d"), ("fleet's mean", "s"), ("± 95 %", "s"), "unit"),
         *(("spread of units, 1 σ", "s"), (f"drift per {per}" if per else "drift", "s"), "remark"),
     )
-    blocks: list[Block] = []
-    if rows:
-        blocks.append(make_table("Shared values, at the fields' means.", columns, rows))
+    blocks = make_tables("Shared values, at the fields' means.", columns, rows)
     blocks += make_notes("Of all parameters", shared)
     names = ", ".join(map(get_parameter_label, missing))
     blocks += make_notes("Not estimated: from the card in most logs", [names] if names else [])
@@ -188,9 +184,9 @@ def build_vehicle_section(store: Store, folder: Path) -> Section:
         cells.append((name, vehicle, value, half_text, display.label, verdict))
     columns = ("parameter", "vehicle", ("value", "s"), ("± 95 %", "s"), "unit", "verdict")
     caption = f"Each vehicle from all its logs{make_truncation_caption(len(rows))}."
-    blocks: list[Block] = [make_table(caption, columns, cells)] if cells else []
     intro = "Bus logs of one vehicle are identified together and have one result."
-    return Section("vehicles", "Vehicles of bus logs", intro, blocks)
+    tables = make_tables(caption, columns, cells)
+    return Section("vehicles", "Vehicles of bus logs", intro, tables)
 
 
 def _has_several_rules(found: Sequence[JointEstimate]) -> bool:
@@ -305,7 +301,6 @@ def _compute_relative_effect(one: JointEstimate) -> float:
 
 def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder: Path) -> Section:
     """Build the units beyond chance, and the logs that do not fit."""
-    blocks: list[Block] = []
     units = [
         (
             *(unit.unit, make_parameter_cell(one.parameter)),
@@ -315,13 +310,12 @@ def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder:
         for unit in one.units
         if unit.odd
     ]
-    if units:
-        columns = (
-            *("unit", "parameter", "deviation ± 95 %"),
-            ("standard deviations of the units", ".1f"),
-        )
-        caption = "Units beyond what chance makes. They count in shared value and spread."
-        blocks.append(make_table(caption, columns, units))
+    columns = (
+        *("unit", "parameter", "deviation ± 95 %"),
+        ("standard deviations of the units", ".1f"),
+    )
+    caption = "Units beyond what chance makes. They count in shared value and spread."
+    blocks = make_tables(caption, columns, units)
     logs = [
         (
             Cell(Path(outlier.path).name, href=make_report_link(store, outlier.log, folder)),
@@ -330,10 +324,9 @@ def _build_outlier_section(store: Store, found: Sequence[JointEstimate], folder:
         for one in found
         for outlier in one.outliers
     ]
-    if logs:
-        caption = f"Logs that do not fit{make_truncation_caption(len(logs))}."
-        named = ("log", "parameter", "value", "expected", "reason")
-        blocks.append(make_table(caption, named, logs[:MOST_ROWS]))
+    caption = f"Logs that do not fit{make_truncation_caption(len(logs))}."
+    named = ("log", "parameter", "value", "expected", "reason")
+    blocks += make_tables(caption, named, logs[:MOST_ROWS])
     intro = "Logs that do not fit are left out of the shared values above."
     return Section("odd", "Outliers", intro, blocks)
 
@@ -378,7 +371,7 @@ def _build_quality_section(store: Store) -> Section:
         *("figure", "shift", ("shifts", "d"), ("median", "3")),
         *(("10 %", "3"), ("90 %", "3")),
     )
-    blocks: list[Block] = [make_table("Shift quality of the fleet", columns, rows)] if rows else []
+    blocks = make_tables("Shift quality of the fleet", columns, rows)
     odd = [(unit, one) for unit, one in compare_units(units) if one.differs]
     if odd:
         table = build_comparison_table([one for _, one in odd[:MOST_ROWS]])
@@ -408,11 +401,8 @@ def _build_failure_section(store: Store) -> Section:
         )
         for path, unit, state, error, what, remedy in every[:MOST_ROWS]
     ]
-    blocks: list[Block] = []
-    if rows:
-        caption = f"Logs without a result{make_truncation_caption(len(every))}."
-        columns = ("log", "state", "reason", "what, and what to do")
-        blocks.append(make_table(caption, columns, rows))
+    caption = f"Logs without a result{make_truncation_caption(len(every))}."
+    blocks = make_tables(caption, ("log", "state", "reason", "what, and what to do"), rows)
     return Section("failed", "Which logs failed, and why", "Nothing is left out silently.", blocks)
 
 
@@ -461,7 +451,7 @@ def build_single_logs_section(store: Store, folder: Path) -> Section:
         *((name, "s") for name in fields),
         ("fit of the output torque, %", ".1f"),
     )
-    blocks: list[Block] = [make_table(caption, columns, rows)] if rows else []
+    blocks = make_tables(caption, columns, rows)
     intro = "Where to look closer: how well the simulation of each log follows its measurement."
     return Section("logs", "Log by log", intro, blocks)
 

@@ -187,6 +187,14 @@ def make_table(
     return TableBlock(caption, heads, cells)
 
 
+def make_tables(
+    caption: str, columns: Sequence[Column], rows: Iterable[Iterable[object]]
+) -> list[Block]:
+    """Build a table as `make_table`; nothing without rows."""
+    table = make_table(caption, columns, rows)
+    return [table] if table.rows else []
+
+
 def _split_column(column: Column) -> tuple[Cell, str]:
     if isinstance(column, Cell):
         return column, ""

@@ -30,6 +30,7 @@ from drivetwin.report.blocks import (
     build_findings_section,
     make_notes,
     make_table,
+    make_tables,
 )
 from drivetwin.report.figure import (
     BAND,
@@ -108,7 +109,7 @@ class BusOutcome:
                 "Road load",
                 "Load at the gearbox output over the efficiency while a gear is held: torque "
                 "message less inertia times acceleration.",
-                list(_build_loads(found)),
+                _build_loads(found),
             ),
             Section(
                 "decays",
@@ -232,39 +233,33 @@ def build_phase_table(timelines: Sequence[Timeline]) -> TableBlock:
     return make_table("Shifts and their phases", columns, rows)
 
 
-def _build_energies(found: BusIdentification) -> Iterator[Block]:
-    if not found.energies:
-        return
+def _build_energies(found: BusIdentification) -> list[Block]:
     rows = []
     for shift, (energy, std) in found.energies.items():
         value, half = format_uncertainty(energy * 1e-3, Z95 * std * 1e-3)
         rows.append((shift, value, half))
     columns = ("shift", ("slip energy kJ", "s"), ("± 95 %", "s"))
-    yield make_table("Slip energy of the closing clutch, from engine torque", columns, rows)
+    return make_tables("Slip energy of the closing clutch, from engine torque", columns, rows)
 
 
-def _build_loads(found: BusIdentification) -> Iterator[Block]:
+def _build_loads(found: BusIdentification) -> list[Block]:
     """Build the table of the road load by span, in the order of speed."""
-    if not found.loads:
-        return
     rows = []
     for one in sorted(found.loads, key=lambda one: one.speed):
         value, half = format_uncertainty(one.torque, Z95 * one.std)
         rows.append((one.label, one.speed * RPM.factor, value, half))
     columns = ("span", ("n_out rpm", ".0f"), ("load over η N·m", "s"), ("± 95 %", "s"))
-    yield make_table("Road load over output speed", columns, rows)
+    return make_tables("Road load over output speed", columns, rows)
 
 
 def _build_decay_tables(found: BusIdentification) -> Iterator[Block]:
     for gear, joint in found.decays.items():
         combined = joint.combined
-        rows = [(name, p) for name, p in combined.p_values.items()]
-        if rows:
-            caption = (
-                f"Gear {gear}: agreement of each decay with the others by noise alone; "
-                f"all together p = {combined.p_value:.2g}"
-            )
-            yield make_table(caption, ("decay", ("p", ".2g")), rows)
+        caption = (
+            f"Gear {gear}: agreement of each decay with the others by noise alone; "
+            f"all together p = {combined.p_value:.2g}"
+        )
+        yield from make_tables(caption, ("decay", ("p", ".2g")), combined.p_values.items())
 
 
 def _build_decays(found: BusIdentification) -> Iterator[Block]:
@@ -310,9 +305,7 @@ def _build_prediction_panel(one: DecayPrediction) -> Panel:
     return Panel("n_in", RPM, curves)
 
 
-def _build_prediction_table(found: BusIdentification) -> Iterator[Block]:
-    if not found.predictions:
-        return
+def _build_prediction_table(found: BusIdentification) -> list[Block]:
     rows = [
         (
             name,
@@ -324,7 +317,7 @@ def _build_prediction_table(found: BusIdentification) -> Iterator[Block]:
     ]
     sizes = (("error rpm", "3"), ("oscillation rpm", "3"), ("trend alone rpm", "3"))
     columns = ("decay", ("samples", "d"), ("inside band %", ".1f"), *sizes)
-    yield make_table("Prediction of held-out decays by the others", columns, rows)
+    return make_tables("Prediction of held-out decays by the others", columns, rows)
 
 
 _TCU_HEIGHT = 190

@@ -92,7 +92,7 @@ def simulate_trials(
 
 def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
     """Build the section that compares the parameters and tests their agreement."""
-    found = compare_estimates(candidates)
+    found = compare_estimates([one.estimates for one in candidates])
     judged = [one for one in found if one.agrees is not None]
     differing = [one for one in judged if not one.agrees]
     blocks: list[Block] = [TilesBlock(_build_tiles(candidates, judged, differing))]

@@ -82,12 +82,10 @@ class Agreement:
         return None if self.apart is None else self.apart <= DIFFER
 
 
-def compare_estimates(candidates: Sequence[Candidate]) -> list[Agreement]:
+def compare_estimates(candidates: Sequence[Mapping[str, Estimate]]) -> list[Agreement]:
     """Compare every parameter that some candidate estimates, in the order of the first such one."""
-    ids = dict.fromkeys(name for one in candidates for name in one.estimates)
-    found = (
-        _compare_parameter(name, [one.estimates.get(name) for one in candidates]) for name in ids
-    )
+    ids = dict.fromkeys(name for one in candidates for name in one)
+    found = (_compare_parameter(name, [one.get(name) for one in candidates]) for name in ids)
     return [one for one in found if one is not None]
 
 

@@ -59,6 +59,13 @@ _NO_TWIN = {
 """Reason and remedy where a result cannot have a twin."""
 
 
+_ORIGINS: dict[type, str] = {
+    BusFile: "bus logs",
+    FitFile: "fit",
+    TcuFile: "log of a gearbox control",
+}
+
+
 @dataclass(frozen=True, eq=False)
 class MadeResult:
     """A result in `file`: the content of its file, or a twin."""
@@ -154,25 +161,18 @@ class MadeResult:
 
     def to_candidate(self, name: str) -> Candidate:
         """Return the result as one of a comparison."""
-        origin: tuple[str, Mapping[str, str]]
-        match self.content:
-            case Twin() as twin:
-                return Candidate.from_twin(name, twin)
-            case ResultFile() as content:
-                friction = {element: one.to_curve() for element, one in content.friction.items()}
-                fit = {signal: _to_fits(phases) for signal, phases in content.fit.items()}
-                origin = content.method, content.inputs
-            case BusFile() as content:
-                friction, fit = {}, {}
-                origin = "bus logs", dict.fromkeys(content.logs, "")
-            case TcuFile() as content:
-                friction, fit = {}, {}
-                origin = "log of a gearbox control", dict.fromkeys(content.logs, "")
-            case FitFile() as content:
-                friction = {}
-                fit = {name: {"all": one} for name, one in _to_fits(content.fit[0]).items()}
-                origin = "fit", dict.fromkeys(content.logs, "")
-        return Candidate(name, origin[0], self.estimates, friction, fit, origin[1], content.version)
+        content, friction, fit = self.content, {}, {}
+        if isinstance(content, Twin):
+            return Candidate.from_twin(name, content)
+        if isinstance(content, ResultFile):
+            friction = {element: one.to_curve() for element, one in content.friction.items()}
+            fit = {signal: _to_fits(phases) for signal, phases in content.fit.items()}
+            method, inputs = str(content.method), content.inputs
+        else:
+            method, inputs = _ORIGINS[type(content)], dict.fromkeys(content.logs, "")
+        if isinstance(content, FitFile):
+            fit = {output: {"all": one} for output, one in _to_fits(content.fit[0]).items()}
+        return Candidate(name, method, self.estimates, friction, fit, inputs, content.version)
 
 
 def _restore_unknown(name: str, record: ParameterRecord) -> Estimate:

@@ -41,6 +41,7 @@ from drivetwin.report.blocks import (
     make_notes,
     make_number,
     make_table,
+    make_tables,
 )
 from drivetwin.report.figure import (
     DIVERGING,
@@ -348,7 +349,7 @@ def build_suggestion_blocks(
         Cell("experiment that would narrow it", note="± 95 % then"),
         Cell("best number to measure", note="± 95 % then"),
     )
-    table = make_table(
+    tables = make_tables(
         "Next recordings: each experiment was simulated with this model and the noise of this "
         "log's sensors, and the information it adds gives the interval to expect. A number on the "
         "card that is known exactly takes its share of the variance away.",
@@ -356,7 +357,7 @@ def build_suggestion_blocks(
         rows,
     )
     texts = [f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
-    return [*([table] if rows else []), *make_notes("Not narrowed by an experiment", texts)]
+    return [*tables, *make_notes("Not narrowed by an experiment", texts)]
 
 
 def _name_number(number: CardNumber) -> str:

@@ -37,6 +37,7 @@ from drivetwin.report.blocks import (
     make_notes,
     make_number,
     make_table,
+    make_tables,
 )
 from drivetwin.report.figure import (
     MUTED,
@@ -52,7 +53,7 @@ from drivetwin.report.figure import (
 )
 from drivetwin.report.figures.stack import Curve, Panel, stack_panels
 from drivetwin.report.figures.validation import OUTPUTS, draw_band, plot_validation
-from drivetwin.report.find_reports import Agreement, Candidate, Trial, compare_estimates
+from drivetwin.report.find_reports import Agreement, Trial, compare_estimates
 from drivetwin.report.sections.parameters import make_parameter_cell, make_value_cell
 from drivetwin.report.sections.summary import build_fit_table, make_fit_cell
 from drivetwin.validation.simulate_log import SIGNALS
@@ -77,12 +78,8 @@ def build_joint_section(found: Identification, several: Several) -> Section:
     ]
     shared = {k: one for k, one in found.estimates.items() if not split_log_number(k)[1]}
     names = [f"log {one.number}" for one in several.logs]
-    separate = [(name, one.alone) for name, one in zip(names, several.logs, strict=True)]
-    candidates = [
-        Candidate(name, "", {k: v for k, v in alone.items() if k in shared}, {}, {}, {}, "")
-        for name, alone in (*separate, (_TOGETHER, shared))
-    ]
-    compared = [one for one in compare_estimates(candidates) if one.apart is not None]
+    alone = [{k: v for k, v in one.alone.items() if k in shared} for one in several.logs]
+    compared = [one for one in compare_estimates([*alone, shared]) if one.apart is not None]
     blocks: list[Block] = [
         TilesBlock(tiles),
         build_log_table(found, several),
@@ -202,10 +199,9 @@ def _format_torque_fit(one: HeldOut) -> str:
 def build_judgement_blocks(found: Identification, held: Sequence[HeldOut]) -> list[Block]:
     """Errors of the predictions, parameters of logs that were not fitted, and remarks."""
     blocks: list[Block] = [_build_judgement_table(found, held)]
-    if own := list(_iterate_log_rows(held)):
-        text = "Log-specific parameters, from the gear held before the shift."
-        columns = ("log", "parameter", ("value", "s"), "unit", "from")
-        blocks.append(make_table(text, columns, own))
+    text = "Log-specific parameters, from the gear held before the shift."
+    columns = ("log", "parameter", ("value", "s"), "unit", "from")
+    blocks += make_tables(text, columns, _iterate_log_rows(held))
     notes = [f"{one.name}: {text}" for one in held for text in render(one.findings)]
     return [*blocks, *make_notes("About the predictions", notes, Tone.DOUBTFUL)]
 

@@ -12,11 +12,9 @@ from dash import Dash, Input, Output, State, html
 from dash.development.base_component import Component
 
 from drivetwin.channels.roles import NEEDED
-from drivetwin.estimation.result.estimate import Verdict
+from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.report.blocks import Tone
 from drivetwin.report.model_verdict import STATUS_TONES
-from drivetwin.shifts.shift import make_shift_labels
-from drivetwin.workbench.identifying import Outcome
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views.widgets import Topic, make_attributes, make_topic_id
@@ -71,161 +69,113 @@ def assess_steps(work: SessionState, *, running: bool = False) -> list[StepState
 
 def _iterate_states(work: SessionState, running: bool) -> Iterator[StepState]:
     """Yield the state of each step; a step that can be done is open."""
-    if work.opened is None or work.log is None:
+    if work.opened is None:
         yield StepState(Step.LOG, Status.OPEN, "Open a log, or the sample.")
         for step in list(Step)[1:]:
             yield StepState(step, Status.BLOCKED, "No log is open.", Step.LOG)
         return
-    yield StepState(Step.LOG, Status.DONE, _describe_logs(work))
-    yield _assess_channels(work)
-    yield _assess_card(work)
-    yield _assess_shifts(work)
-    yield _assess_identification(work, running)
-    yield from _assess_use(work, running)
-
-
-def _describe_logs(work: SessionState) -> str:
-    names = [one.source.name for one in work.logs]
-    return f"{names[0]} is open." if len(names) == 1 else f"{len(names)} logs are open."
-
-
-def _find_unreadable(work: SessionState) -> str:
-    """Return the fault of the first log that cannot be read as mapped; empty without one."""
-    names = [one.source.name for one in work.logs if one.opened.log is None]
-    return f"{names[0]} cannot be read as mapped." if names else ""
+    names = ", ".join(one.source.name for one in work.logs)
+    yield StepState(Step.LOG, Status.DONE, f"Open: {names}.")
+    channels = _assess_channels(work)
+    shifts = _assess_shifts(work, channels)
+    identified = _assess_identification(work, shifts)
+    if running:
+        text = "The identification is running."
+        identified = StepState(Step.IDENTIFY, Status.RUNNING, text)
+    yield from (channels, _assess_card(work), shifts, identified)
+    yield from _assess_use(work, identified)
 
 
 def _assess_channels(work: SessionState) -> StepState:
-    log = work.require_opened().log
-    fault = _find_unreadable(work)
-    if log is None or fault:
-        return StepState(Step.CHANNELS, Status.OPEN, fault)
+    for one in work.logs:
+        if one.opened.log is None:
+            text = f"{one.source.name} cannot be read as mapped."
+            return StepState(Step.CHANNELS, Status.OPEN, text)
+    log = work.require_log()
     missing = [role for role in NEEDED if role not in log]
-    if missing:
-        text = f"{len(log.channels)} channels are mapped; not in the log: {', '.join(missing)}."
-        return StepState(Step.CHANNELS, Status.DONE, text)
-    return StepState(Step.CHANNELS, Status.DONE, f"{len(log.channels)} channels are mapped.")
+    tail = f"; not in the log: {', '.join(missing)}." if missing else "."
+    text = f"{len(log.channels)} channels are mapped{tail}"
+    return StepState(Step.CHANNELS, Status.DONE, text)
 
 
 def _assess_card(work: SessionState) -> StepState:
     opened = work.require_opened()
-    if opened.ratios is not None:
-        name = opened.ratios.name or opened.ratios.source
-        text = f"{name} is open: ratios of {len(opened.ratios.ratios)} gears."
-        return StepState(Step.CARD, Status.DONE, text)
-    if opened.card is None:
+    if opened.card is None and opened.ratios is None:
         text = "Open a vehicle card, or write one; for bus logs a card of the ratios is enough."
         return StepState(Step.CARD, Status.OPEN, text)
-    name = work.card.name if work.card is not None else opened.card.name
-    count = len(opened.doubts)
-    doubt = f"; {count} {'remark' if count == 1 else 'remarks'}" if count else ""
+    name = "The card" if work.card is None else work.card.name
+    doubt = f", with {len(opened.doubts)} doubtful entries" if opened.doubts else ""
     return StepState(Step.CARD, Status.DONE, f"{name} is open{doubt}.")
 
 
-def _assess_shifts(work: SessionState) -> StepState:
-    opened = work.require_opened()
-    if fault := _find_unreadable(work):
-        return StepState(Step.SHIFTS, Status.BLOCKED, fault, Step.CHANNELS)
-    if opened.ratios is not None:
-        return StepState(Step.SHIFTS, Status.DONE, _describe_bus_shifts(work))
-    if opened.card is None:
+def _assess_shifts(work: SessionState, channels: StepState) -> StepState:
+    """Count the shifts and what is held out of them; of bus logs once they are identified."""
+    opened, count = work.require_opened(), len(work.all_shifts)
+    if channels.status is Status.OPEN:
+        return StepState(Step.SHIFTS, Status.BLOCKED, channels.text, Step.CHANNELS)
+    if opened.card is None and opened.ratios is None:
         return StepState(Step.SHIFTS, Status.BLOCKED, "No vehicle card is open.", Step.CARD)
-    if not work.all_shifts:
+    if not count and opened.ratios is None:
         text = "The log has no usable shift. The reasons are below."
         return StepState(Step.SHIFTS, Status.BLOCKED, text, Step.CARD, has_content=True)
-    return StepState(Step.SHIFTS, Status.DONE, _describe_shifts(work))
-
-
-def _describe_bus_shifts(work: SessionState) -> str:
-    held = sum(bool(one.held) for one in work.logs)
-    tail = f", {held} {'log' if held == 1 else 'logs'} held out." if held else "."
-    if work.bus is None:
-        return f"The identification finds the shifts of the bus logs{tail}"
-    count = len(work.bus.found.shifts)
-    return f"{count} {'shift' if count == 1 else 'shifts'} found{tail}"
-
-
-def _describe_shifts(work: SessionState) -> str:
-    """Name the shifts of one log, or count those of several; and those held out."""
-    count = len(work.all_shifts)
-    held = sum(len(one.held) for one in work.logs)
-    if len(work.logs) == 1:
-        text = f"{', '.join(make_shift_labels(work.shifts))} found"
-    else:
-        text = f"{count} {'shift' if count == 1 else 'shifts'} of {len(work.logs)} logs found"
-    return f"{text}, {held} held out." if held else f"{text}."
-
-
-def _assess_identification(work: SessionState, running: bool) -> StepState:
-    if running:
-        return StepState(Step.IDENTIFY, Status.RUNNING, "The identification is running.")
-    if fault := _find_unreadable(work):
-        return StepState(Step.IDENTIFY, Status.BLOCKED, fault, Step.CHANNELS)
-    if work.ratios is not None:
-        return _assess_bus(work)
-    if not work.all_shifts:
-        return StepState(Step.IDENTIFY, Status.BLOCKED, "There is no shift.", Step.SHIFTS)
-    if not any(one.fitted for one in work.logs):
-        text = "Every shift is held out."
-        return StepState(Step.IDENTIFY, Status.BLOCKED, text, Step.SHIFTS)
-    if work.result is not None:
-        return _assess_outcome(work.result)
-    text = "The identification failed." if work.ended else "Press Identify."
-    return StepState(Step.IDENTIFY, Status.OPEN, text)
-
-
-def _assess_bus(work: SessionState) -> StepState:
-    """Return the state of the identification of bus logs."""
+    text = f"{_count(count, 'shift')} of {_count(len(work.logs), 'log')} found"
+    if opened.ratios is not None:
+        text = "The identification finds the shifts of the bus logs"
     if work.bus is not None:
-        verdicts = [one.verdict for one in work.bus.found.estimates.values()]
-        count = verdicts.count(Verdict.IDENTIFIED)
-        text = f"{count} of {len(verdicts)} quantities identified."
-        return StepState(Step.IDENTIFY, Status.DONE, text)
-    if all(one.held for one in work.logs):
-        return StepState(Step.IDENTIFY, Status.BLOCKED, "Every log is held out.", Step.SHIFTS)
-    text = "The identification failed." if work.ended else "Press Identify."
-    return StepState(Step.IDENTIFY, Status.OPEN, text)
+        text = f"{_count(len(work.bus.found.shifts), 'shift')} found"
+    held = sum(len(one.held) for one in work.logs)
+    return StepState(Step.SHIFTS, Status.DONE, f"{text}{f', {held} held out' if held else ''}.")
 
 
-def _assess_outcome(outcome: Outcome) -> StepState:
-    """Return the state of a finished identification, with the verdict on the model."""
-    verdicts = [one.verdict for one in outcome.twin.parameters.values()]
-    identified = verdicts.count(Verdict.IDENTIFIED)
-    count = f"{identified} of {len(verdicts)} parameters identified"
-    if outcome.found is None:
-        text = f"Twin of a workspace, without the evidence for a verdict: {count}."
-        return StepState(Step.IDENTIFY, Status.DONE, text, tone=Tone.UNKNOWN)
-    status = outcome.found.status
-    text = f"Model {status.value}: {count}."
-    return StepState(Step.IDENTIFY, Status.DONE, text, tone=STATUS_TONES[status])
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _assess_use(work: SessionState, running: bool) -> Iterator[StepState]:
+def _assess_identification(work: SessionState, shifts: StepState) -> StepState:
+    """Return the state of the identification, with the verdict on the model once finished."""
+    if shifts.status is Status.BLOCKED:
+        return StepState(Step.IDENTIFY, Status.BLOCKED, shifts.text, shifts.remedy)
+    if all(len(one.held) == one.parts for one in work.logs):
+        text = "All shifts are held out."
+        return StepState(Step.IDENTIFY, Status.BLOCKED, text, Step.SHIFTS)
+    if work.bus is None and work.result is None:
+        text = "The identification failed." if work.ended else "Press Identify."
+        return StepState(Step.IDENTIFY, Status.OPEN, text)
+    tone: Tone | None = None
+    estimates: Mapping[str, Estimate]
+    if work.bus is not None:
+        estimates, text = work.bus.found.estimates, "Bus logs"
+    elif (outcome := work.require_outcome()).found is None:
+        estimates, tone = outcome.twin.parameters, Tone.UNKNOWN
+        text = "Twin of a workspace, without the evidence for a verdict"
+    else:
+        estimates, status = outcome.twin.parameters, outcome.found.status
+        text, tone = f"Model {status.value}", STATUS_TONES[status]
+    identified = sum(one.verdict is Verdict.IDENTIFIED for one in estimates.values())
+    text += f": {identified} of {len(estimates)} values identified."
+    return StepState(Step.IDENTIFY, Status.DONE, text, tone=tone)
+
+
+def _assess_use(work: SessionState, identified: StepState) -> Iterator[StepState]:
     """Yield the states of model and export, which need a finished identification."""
-    if not running and work.bus is not None:
-        yield StepState(Step.MODEL, Status.BLOCKED, "Bus logs give quantities, but no model.")
-        yield _assess_export(work)
-        return
-    if running or work.result is None:
-        text = "The identification is running." if running else "Nothing is identified."
+    if identified.status is not Status.DONE:
+        is_running = identified.status is Status.RUNNING
+        text = identified.text if is_running else "Nothing is identified."
         for step in (Step.MODEL, Step.EXPORT):
             yield StepState(step, Status.BLOCKED, text, Step.IDENTIFY)
         return
-    if work.has_viewed:
-        text = "Simulation and measurement were compared."
+    status, text = Status.OPEN, "Compare simulation and measurement."
+    if work.bus is not None:
+        status, text = Status.BLOCKED, "Bus logs give quantities, but no model."
+    elif work.has_viewed:
+        status, text = Status.DONE, "Simulation and measurement were compared."
         if work.require_open_log().source.name not in work.require_outcome().twins:
             text = "The log shown was not fitted; choose a fitted one."
-        yield StepState(Step.MODEL, Status.DONE, text)
-    else:
-        yield StepState(Step.MODEL, Status.OPEN, "Compare simulation and measurement.")
-    yield _assess_export(work)
-
-
-def _assess_export(work: SessionState) -> StepState:
+    yield StepState(Step.MODEL, status, text)
+    status, text = Status.OPEN, "Download report, result or model."
     if work.has_exported:
-        return StepState(Step.EXPORT, Status.DONE, "A file was exported.")
-    files = "report or model" if work.bus is None else "report or result"
-    return StepState(Step.EXPORT, Status.OPEN, f"Download {files}.")
+        status, text = Status.DONE, "A file was exported."
+    yield StepState(Step.EXPORT, status, text)
 
 
 TITLES = {
