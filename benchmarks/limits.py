@@ -98,7 +98,7 @@ def measure_slider(_argument: str) -> Iterator[Figure]:
     from drivetwin.cli.synth import write_run
     from drivetwin.dyno.dyno import run
     from drivetwin.dyno.scenario_file import load_scenario
-    from drivetwin.workbench.sessions import Sessions
+    from drivetwin.workbench.session import Sessions
     from drivetwin.workbench.workspace import Folder
 
     with tempfile.TemporaryDirectory() as name:

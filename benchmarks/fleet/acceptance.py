@@ -18,8 +18,8 @@ from time import perf_counter
 
 from drivetwin.cli.fleet import RunProgress
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.mixed_model.estimate import estimate_fleet
-from drivetwin.fleet.mixed_model.mixed import Interval, JointEstimate
+from drivetwin.fleet.estimate import estimate_fleet
+from drivetwin.fleet.mixed import Interval, JointEstimate
 from drivetwin.fleet.rules import Sources, read_rules
 from drivetwin.fleet.store import Store
 from drivetwin.fleet.task import Event, Settled, State

@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.errors import InputError
-from drivetwin.workbench.sessions import Sessions
+from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.views.export import Record, make_product
 from drivetwin.workbench.views.stepper import assess_steps
 from drivetwin.workbench.workspace import Folder

@@ -15,7 +15,7 @@ from flask.testing import FlaskClient
 from drivetwin.cli import main
 from drivetwin.workbench.access_control import Access
 from drivetwin.workbench.server import build_server
-from drivetwin.workbench.sessions import Sessions
+from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.views.page import Start
 from drivetwin.workbench.workspace import Folder
 

@@ -15,9 +15,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from drivetwin._util.arrays import format_json
 from drivetwin._util.atomic import compute_digest, write_text
 from drivetwin._util.optional_dependencies import get_program_version
+from drivetwin._util.plain_values import format_json
 from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration, Task
 from drivetwin.calibration.calibrate import calibrate as run_calibration
@@ -33,16 +33,17 @@ from drivetwin.calibration.operating_map import (
     calibrate_map,
     trace_front,
 )
-from drivetwin.calibration.options import CalibrationOptions, PolicyKind
+from drivetwin.calibration.options import CalibrationOptions, PolicyKind, ShiftOptions
 from drivetwin.calibration.policies.slip import BENCH, BENCH_DEFINES, HEADER, UserController
 from drivetwin.calibration.polish import require_limits
+from drivetwin.calibration.trial import Difference, Trial, compare_trials, run_trials
 from drivetwin.calibration.twin_task import Request, build_task, choose_start
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.export import parse_gears
 from drivetwin.cli.input_files import read_twin_log
-from drivetwin.cli.options import RESULT, TWIN
-from drivetwin.cli.output import print_line, show_step, write_atomically
-from drivetwin.cli.requests.use import Calibrate
+from drivetwin.cli.options import REPORT, RESULT, TWIN
+from drivetwin.cli.output import print_line, show_step, write_atomically, write_texts
+from drivetwin.cli.requests.use import Calibrate, Try
 from drivetwin.errors import (
     CompilerError,
     ControllerError,
@@ -65,15 +66,20 @@ from drivetwin.export.parameters.files import (
 from drivetwin.export.parameters.of_twin import collect_calibration
 from drivetwin.files.calibration_file import (
     Provenance,
-    Requirements,
     build_calibration_document,
     build_calibration_file,
     build_certificate_document,
+    read_calibration_file,
+    write_calibration_file,
+)
+from drivetwin.files.limits_file import (
+    STOCK,
+    Requirements,
+    TrialFile,
     build_user_controller,
     load_controller_file,
     load_limits,
-    read_calibration_file,
-    write_calibration_file,
+    load_trials,
 )
 from drivetwin.files.records import dump_findings
 from drivetwin.files.result_file import load_result
@@ -87,6 +93,7 @@ from drivetwin.report.calibration import (
 )
 from drivetwin.report.html import save_page
 from drivetwin.report.model_verdict import explain_result
+from drivetwin.report.trial import build_trial_blocks, build_trials_page, format_junit
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.twin.twin import Twin
 
@@ -151,7 +158,7 @@ def to_correction_document(found: Correction | None) -> dict[str, Any]:
     }
 
 
-CALIBRATION, CERTIFICATE, REPORT = "calibration.toml", "certificate.json", "report.html"
+CALIBRATION, CERTIFICATE = "calibration.toml", "certificate.json"
 Results = tuple[Calibration, Front | None, OperatingMap | None]
 
 
@@ -380,3 +387,51 @@ def _write_results(
             save_twin(folder / TWIN, twin)
         names = sorted(one.name for one in folder.iterdir())
     return tuple(request.output / one for one in names)
+
+
+JUNIT = "junit.xml"
+FAILED = 1
+"""Exit code where an assertion fails."""
+
+
+def try_controller(request: Try) -> Outcome:
+    """Run the scenarios by one or two controllers, and write page and JUnit file."""
+    twin, trials = load_valid_twin(request.twin), load_trials(request.scenarios or STOCK)
+    found = _run(twin, trials, request, request.controller)
+    differences: list[Difference] = []
+    if request.against is not None:
+        differences = compare_trials(found, _run(twin, trials, request, request.against))
+    files: Sequence[Path] = ()
+    if request.output is not None:
+        name = request.controller.stem
+        page = build_trials_page(found, differences, f"Test of {name}")
+        files = write_texts(request.output, {JUNIT: format_junit(found, name), REPORT: page})
+    states = [
+        {
+            "scenario": one.scenario.name,
+            "error": one.error,
+            "checks": [asdict(check) for check in one.checks],
+        }
+        for one in found
+    ]
+    return Outcome(
+        build_trial_blocks(found, differences),
+        {"scenarios": states, "differences": [asdict(one) for one in differences]},
+        files,
+        exit_code=FAILED if any(one.failed for one in found) else 0,
+    )
+
+
+def _run(twin: Twin, trials: TrialFile, request: Try, path: Path) -> list[Trial]:
+
+    asked = Request(
+        **request.select(ShiftOptions),
+        gears=parse_gears(request.shift),
+        spread=trials.spread,
+        oil=trials.oil.to_friction(),
+        policy=PolicyKind.OWN,
+    )
+    scenarios = trials.list_scenarios(request.shift, request.draws)
+    with compile_controller(path, bench=True) as given, show_step(f"testing {path.name}"):
+        timed = replace(given, task=request.task or given.task)
+        return run_trials(twin, asked, timed, scenarios)

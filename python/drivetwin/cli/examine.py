@@ -36,8 +36,8 @@ from drivetwin.fit.examine import REPEATS, Improvement, rank_improvements
 from drivetwin.likelihood.profile import Profile
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import Block, Cell, Outcome, TableBlock, make_table
-from drivetwin.report.sections.parameters import build_suggestion_blocks, format_half_width
-from drivetwin.report.sections.summary import build_friction_table
+from drivetwin.report.parameters import build_suggestion_blocks, format_half_width
+from drivetwin.report.summary import build_friction_table
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import JointIdentification

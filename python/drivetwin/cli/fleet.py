@@ -16,7 +16,7 @@ from drivetwin.cli.output import make_console, print_line, show_step
 from drivetwin.cli.requests.desk import EstimateFleet, QueryFleet, ReportFleet, RunFleet
 from drivetwin.errors import INTERRUPTED, InputError
 from drivetwin.fleet.coordinator import FleetRun, run_fleet
-from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
+from drivetwin.fleet.estimate import estimate_fleet, list_missing_estimates
 from drivetwin.fleet.options import FleetOptions
 from drivetwin.fleet.query import query_store, save_answer
 from drivetwin.fleet.report import PAGE as REPORT

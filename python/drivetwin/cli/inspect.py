@@ -33,7 +33,7 @@ from drivetwin.logs.survey import (
 )
 from drivetwin.plausibility.check import drop_card_findings
 from drivetwin.report.blocks import Block, Outcome, TextBlock, build_findings_section, make_notes
-from drivetwin.report.sections.inputs import build_column_table
+from drivetwin.report.inputs import build_column_table
 from drivetwin.vehicle.card import VehicleCard, is_ratio_card, load_card
 
 

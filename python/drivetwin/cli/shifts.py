@@ -35,7 +35,7 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.bus import build_phase_table as build_bus_table
 from drivetwin.report.html import save_page
-from drivetwin.report.sections.summary import build_phase_table
+from drivetwin.report.summary import build_phase_table
 from drivetwin.report.whole_drive import (
     build_comparison_table,
     build_quality_tables,

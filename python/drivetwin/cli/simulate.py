@@ -32,7 +32,7 @@ from drivetwin.report.find_reports import Candidate, Trial
 from drivetwin.report.fit import build_prediction_blocks, build_prediction_page
 from drivetwin.report.html import save_page
 from drivetwin.report.results import MadeResult, open_result
-from drivetwin.report.sections.summary import build_fit_table
+from drivetwin.report.summary import build_fit_table
 from drivetwin.shifts.detect import require_shifts
 from drivetwin.tcu.log import read_controller_log
 from drivetwin.tcu.outcome import list_unfitted_kinds, predict

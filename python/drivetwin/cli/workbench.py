@@ -32,7 +32,7 @@ def workbench(request: OpenWorkbench) -> Outcome:
     from drivetwin.workbench.access_control import Access
     from drivetwin.workbench.jobs import end_all
     from drivetwin.workbench.server import build_server, start_server
-    from drivetwin.workbench.sessions import remove_dead_folders
+    from drivetwin.workbench.session import remove_dead_folders
     from drivetwin.workbench.workspace import Folder
 
     place, access = Folder.from_path(request.folder), Access()

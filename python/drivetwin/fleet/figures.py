@@ -11,7 +11,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import get_display_unit
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
-from drivetwin.fleet.mixed_model.mixed import Drift, JointEstimate
+from drivetwin.fleet.mixed import Drift, JointEstimate
 from drivetwin.fleet.rules import is_date, to_datetime
 from drivetwin.fleet.store import ONE_FILE_EACH, Store
 from drivetwin.fleet.task import RowKind

@@ -15,6 +15,7 @@ import numpy as np
 from drivetwin._util.display_units import format_significant, format_uncertainty, get_display_unit
 from drivetwin.bus.scatter import METHOD as BUS_METHOD
 from drivetwin.estimation.result.estimate import Z95, Verdict
+from drivetwin.fleet.estimate import estimate_fleet, list_missing_estimates
 from drivetwin.fleet.figures import (
     collect_unit_figures,
     compare_units,
@@ -24,9 +25,8 @@ from drivetwin.fleet.figures import (
     plot_units,
 )
 from drivetwin.fleet.identify import LIBRARY
-from drivetwin.fleet.mixed_model.estimate import estimate_fleet, list_missing_estimates
-from drivetwin.fleet.mixed_model.mixed import Interval, JointEstimate, Outlier
-from drivetwin.fleet.mixed_model.observations import collect_facts, collect_output_fits
+from drivetwin.fleet.mixed import Interval, JointEstimate, Outlier
+from drivetwin.fleet.observations import collect_facts, collect_output_fits
 from drivetwin.fleet.rules import format_reading, format_span, get_drift_unit
 from drivetwin.fleet.store import REPORTS, Store
 from drivetwin.fleet.task import RowKind, State
@@ -49,9 +49,9 @@ from drivetwin.report.blocks import (
     make_tables,
 )
 from drivetwin.report.figure import get_parameter_label
-from drivetwin.report.figures.validation import plot_friction
 from drivetwin.report.html import save_page
-from drivetwin.report.sections.parameters import TONES, make_parameter_cell
+from drivetwin.report.parameters import TONES, make_parameter_cell
+from drivetwin.report.validation import plot_friction
 from drivetwin.report.whole_drive import build_comparison_table, get_figure_label
 from drivetwin.shifts.quality import QUALITY_UNITS
 

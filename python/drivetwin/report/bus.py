@@ -41,9 +41,9 @@ from drivetwin.report.figure import (
     Figure,
     get_parameter_label,
 )
-from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
-from drivetwin.report.sections.parameters import build_parameter_blocks
+from drivetwin.report.parameters import build_parameter_blocks
+from drivetwin.report.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.tcu.log import SPEEDS
 from drivetwin.tcu.outcome import TcuIdentification
 from drivetwin.tcu.predict import PredictedShift

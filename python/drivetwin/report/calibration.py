@@ -43,7 +43,7 @@ from drivetwin.report.figure import (
     make_layout,
     make_trace,
 )
-from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.report.trial import get_metric_display, plot_distributions, plot_profiles
 
 _FEWEST_MOVED = 0.01

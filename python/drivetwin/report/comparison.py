@@ -33,9 +33,9 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figure import get_estimate_label
 from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
-from drivetwin.report.sections.parameters import make_estimate_cell, make_value_cell
-from drivetwin.report.sections.summary import build_labelled_fits
-from drivetwin.report.sections.together import (
+from drivetwin.report.parameters import make_estimate_cell, make_value_cell
+from drivetwin.report.summary import build_labelled_fits
+from drivetwin.report.together import (
     plot_agreement,
     plot_fit_matrix,
     plot_friction_overlay,

@@ -35,7 +35,7 @@ from drivetwin.report.figure import (
     make_layout,
     make_trace,
 )
-from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.simulation.dual_clutch import FloatArray
 
 _ROUND_OFF = 1e-12

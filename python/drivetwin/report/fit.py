@@ -36,9 +36,9 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figure import MEASURED, MUTED, OVER, SIMULATED, UNDER, Figure
-from drivetwin.report.figures.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.report.model_verdict import ModelVerdict, build_verdict_block
-from drivetwin.report.sections.parameters import build_parameter_blocks
+from drivetwin.report.parameters import build_parameter_blocks
+from drivetwin.report.stack import Curve, Panel, plot_over_time_axis
 from drivetwin.simulation.network import NetworkRun, Output
 
 _HEIGHT = 190

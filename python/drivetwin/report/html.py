@@ -41,14 +41,14 @@ from drivetwin.report.blocks import (
 )
 from drivetwin.report.figure import Entry, encode_entries
 from drivetwin.report.model_verdict import build_verdict_block, explain_identification
-from drivetwin.report.sections.parameters import (
+from drivetwin.report.parameters import (
     build_limits_section,
     build_parameter_blocks,
     build_result_section,
     build_suggestion_blocks,
 )
-from drivetwin.report.sections.stage_results import build_stage_sections
-from drivetwin.report.sections.summary import (
+from drivetwin.report.stage_results import build_stage_sections
+from drivetwin.report.summary import (
     build_actuator_section,
     build_fit_table,
     build_friction_section,
@@ -58,7 +58,7 @@ from drivetwin.report.sections.summary import (
     build_shift_section,
     build_validation_section,
 )
-from drivetwin.report.sections.together import (
+from drivetwin.report.together import (
     build_holdout_section,
     build_joint_section,
     build_judgement_blocks,
@@ -171,7 +171,7 @@ def _build_likelihood_sections(found: Identification) -> list[Section]:
     """Build the sections of a likelihood fit, whose modules take long to load; none without one."""
     if found.evidence.likelihood is None:
         return []
-    from drivetwin.report.sections.likelihood import build_likelihood_sections
+    from drivetwin.report.likelihood import build_likelihood_sections
 
     return build_likelihood_sections(found)
 

@@ -19,21 +19,21 @@ from drivetwin.estimation.result.validation import Validation
 from drivetwin.fit.result import ModelFit
 from drivetwin.report.blocks import Block, TextBlock, build_findings_section, make_table
 from drivetwin.report.figure import Figure
-from drivetwin.report.figures.validation import QUANTITIES, plot_log, plot_validation
 from drivetwin.report.fit import build_fit_blocks, plot_recording
 from drivetwin.report.html import build_identification_blocks, render_fragment
-from drivetwin.report.sections.parameters import (
+from drivetwin.report.parameters import (
     build_parameter_blocks,
     plot_intervals,
 )
-from drivetwin.report.sections.summary import (
+from drivetwin.report.summary import (
     build_fit_table,
     build_friction_table,
 )
-from drivetwin.report.sections.together import (
+from drivetwin.report.text import format_blocks
+from drivetwin.report.together import (
     plot_friction_overlay,
 )
-from drivetwin.report.text import format_blocks
+from drivetwin.report.validation import QUANTITIES, plot_log, plot_validation
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import ValidatedModel
 

@@ -40,7 +40,7 @@ from drivetwin.report.figure import (
     make_subplots,
     make_trace,
 )
-from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output
 

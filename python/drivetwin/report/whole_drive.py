@@ -29,8 +29,8 @@ from drivetwin.report.figure import (
     make_axis,
     make_layout,
 )
-from drivetwin.report.figures.stack import Curve, Panel, stack_panels
-from drivetwin.report.figures.validation import plot_shift_phases
+from drivetwin.report.stack import Curve, Panel, stack_panels
+from drivetwin.report.validation import plot_shift_phases
 from drivetwin.shifts.quality import QUALITY_UNITS
 from drivetwin.shifts.shift import Shift
 from drivetwin.shifts.summary import (

@@ -18,7 +18,7 @@ from drivetwin.estimation.result.method import DEFAULT_METHOD
 from drivetwin.findings import Code, report
 from drivetwin.report.bus import BusOutcome, identify_vehicle
 from drivetwin.report.figure import ACCENT, MUTED, Figure
-from drivetwin.report.figures.validation import plot_shift_phases
+from drivetwin.report.validation import plot_shift_phases
 from drivetwin.shifts.quality import compute_shift_quality
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin

@@ -17,7 +17,7 @@ from werkzeug.serving import ThreadedWSGIServer, WSGIRequestHandler
 from drivetwin.errors import InputError, RefusedError
 from drivetwin.workbench import jobs
 from drivetwin.workbench.access_control import ADDRESS, Access, make_refusal, protect
-from drivetwin.workbench.sessions import Sessions
+from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.views.fields import check_callback_requests, escape_callback_responses
 from drivetwin.workbench.views.page import Start, build_page
 from drivetwin.workbench.workspace import LIMITS, Folder

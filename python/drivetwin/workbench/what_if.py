@@ -14,8 +14,8 @@ from drivetwin.estimation.result.validation import Validation
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import make_link
 from drivetwin.report.figure import COMPARED, Figure, encode_entries, get_parameter_name
-from drivetwin.report.figures.stack import Curve, Panel, decimate_around, stack_panels
-from drivetwin.report.figures.validation import build_validation_panels
+from drivetwin.report.stack import Curve, Panel, decimate_around, stack_panels
+from drivetwin.report.validation import build_validation_panels
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.added_elements import ADDED_ELEMENT_IDS
 from drivetwin.simulation.dual_clutch import DualClutch

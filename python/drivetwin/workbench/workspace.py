@@ -23,6 +23,9 @@ from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.toml import FromTable, StrictModel, format_key_path
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
+from drivetwin.dyno.dyno import run
+from drivetwin.dyno.names import ScenarioName
+from drivetwin.dyno.scenario_file import format_card, format_log, load_scenario
 from drivetwin.errors import RefusedError, Where
 from drivetwin.files.twin_file import TwinFile, build_twin_file, restore_twin
 from drivetwin.vehicle.locks import Lock
@@ -366,3 +369,15 @@ def _is_workspace(path: Path) -> bool:
     except RefusedError:
         return False
     return True
+
+
+LOG, CARD = "sample.csv", "sample.card.toml"
+
+
+def write_sample(folder: Path) -> tuple[Path, Path]:
+    """Write log and vehicle card of the sample into a folder; return their paths."""
+    made = run(load_scenario(ScenarioName.PAPER_STEPS), seed=1)
+    log, card = folder / LOG, folder / CARD
+    log.write_text(format_log(made), encoding="utf-8", newline="\n")
+    card.write_text(format_card(made.scenario), encoding="utf-8", newline="\n")
+    return log, card

@@ -149,7 +149,7 @@ class Try(
     ShiftOptions,
     TwinInput,
     command="try",
-    runs="try_controller:try_controller",
+    runs="calibrate:try_controller",
     examples=("try result --shift 2-3 --controller my_controller.toml -o bench",),
 ):
     """Test a controller in C on drawn units of a twin, with faults and assertions.

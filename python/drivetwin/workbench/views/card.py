@@ -16,10 +16,9 @@ from pydantic import TypeAdapter, ValidationError
 from drivetwin.authoring.question import FormEntry, Key
 from drivetwin.errors import RefusedError
 from drivetwin.findings import render
-from drivetwin.report.sections.inputs import build_card_tables, build_ratio_tables
+from drivetwin.report.inputs import build_card_tables, build_ratio_tables
 from drivetwin.vehicle.card_fields import get_card_field
 from drivetwin.workbench.forms import CardForm
-from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import CARD_TEXT, Session
 from drivetwin.workbench.session_state import Source
@@ -30,7 +29,7 @@ from drivetwin.workbench.views.log import (
     format_source,
     register_opening,
 )
-from drivetwin.workbench.views.widgets import render_table
+from drivetwin.workbench.views.widgets import render_table, replace_options
 
 _KEY = TypeAdapter(list[str | int])
 _EXISTING = {"keep": "keep it", "replace": "replace it"}

@@ -14,18 +14,17 @@ from drivetwin.channels.units import list_time_spellings
 from drivetwin.errors import InputError
 from drivetwin.logs.survey import Column
 from drivetwin.report.figure import MEASURED, Figure
-from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
-from drivetwin.report.figures.validation import build_log_panels, plot_log
-from drivetwin.report.sections.inputs import build_column_table
+from drivetwin.report.inputs import build_column_table
+from drivetwin.report.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.validation import build_log_panels, plot_log
 from drivetwin.workbench.forms import Entry, Row, list_roles, list_rows, list_unit_names
-from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened, Preview
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import Index
 from drivetwin.workbench.views.log import Place, build_log_choice, register_log_choice
-from drivetwin.workbench.views.widgets import render_table
+from drivetwin.workbench.views.widgets import render_table, replace_options
 
 _PREVIEW_HEIGHT = 330
 _PROPOSED = (

@@ -12,19 +12,23 @@ from dash.development.base_component import Component
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.report.blocks import build_findings_section, make_table
 from drivetwin.report.figure import get_parameter_label
-from drivetwin.report.sections.parameters import build_result_section
-from drivetwin.report.sections.summary import build_fit_table, build_friction_section
-from drivetwin.report.sections.together import build_holdout_section, build_joint_section
+from drivetwin.report.parameters import build_result_section
+from drivetwin.report.summary import build_fit_table, build_friction_section
+from drivetwin.report.together import build_holdout_section, build_joint_section
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import LockKind
 from drivetwin.workbench.identifying import Outcome
-from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import locks
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.log import build_facts_line
-from drivetwin.workbench.views.widgets import render_block, render_section, render_table
+from drivetwin.workbench.views.widgets import (
+    render_block,
+    render_section,
+    render_table,
+    replace_options,
+)
 
 _EFFORTS = {"full": "full, with other models", "quick": "quick: one model alone"}
 _POLL = 300

@@ -14,7 +14,7 @@ from drivetwin.errors import InputError, Where
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.report.blocks import Cell, make_table
 from drivetwin.report.figure import get_parameter_label, get_parameter_name
-from drivetwin.report.sections.parameters import build_parameter_table
+from drivetwin.report.parameters import build_parameter_table
 from drivetwin.vehicle.locks import Lock, LockKind, can_fix
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState

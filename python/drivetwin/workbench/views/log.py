@@ -13,13 +13,12 @@ from dash.development.base_component import Component
 from drivetwin.findings import render
 from drivetwin.logs.formats.detect import SUFFIXES
 from drivetwin.report.blocks import make_table
-from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.sandboxed_parse import Opened
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import SessionState, Source
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import Index, UploadField, get_triggered_part
-from drivetwin.workbench.views.widgets import render_table
+from drivetwin.workbench.views.widgets import render_table, replace_options
 
 _UPLOADED = "uploaded: "
 _LISTED = 30

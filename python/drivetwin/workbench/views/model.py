@@ -12,11 +12,10 @@ from dash.development.base_component import Component
 
 from drivetwin._util.display_units import format_significant
 from drivetwin.errors import DrivetwinError, InputError, MissingParameterError
-from drivetwin.report.figures.stack import Panel
-from drivetwin.report.sections.summary import build_labelled_fits
+from drivetwin.report.stack import Panel
+from drivetwin.report.summary import build_labelled_fits
 from drivetwin.shifts.shift import make_shift_labels
 from drivetwin.vehicle.locks import can_fix
-from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Live, Session
 from drivetwin.workbench.session_state import SessionState
 from drivetwin.workbench.views import locks
@@ -25,7 +24,7 @@ from drivetwin.workbench.views.export import Record
 from drivetwin.workbench.views.fields import ControlId, Index, parse_positions
 from drivetwin.workbench.views.log import Place, build_log_choice, register_log_choice
 from drivetwin.workbench.views.stepper import Step
-from drivetwin.workbench.views.widgets import render_table
+from drivetwin.workbench.views.widgets import render_table, replace_options
 from drivetwin.workbench.what_if import (
     FRICTION,
     Slider,

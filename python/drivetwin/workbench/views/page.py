@@ -10,9 +10,8 @@ from dash import Dash, Input, Output, State, dcc, html, no_update
 from dash.development.base_component import Component
 
 from drivetwin.report.html import read_template
-from drivetwin.workbench.session import Session
+from drivetwin.workbench.session import Session, Sessions
 from drivetwin.workbench.session_state import Source
-from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views import (
     card,
     channels,

@@ -13,9 +13,9 @@ from dash.development.base_component import Component
 from drivetwin.findings import render
 from drivetwin.report.blocks import TableBlock, make_table
 from drivetwin.report.bus import build_phase_table as build_bus_phases
-from drivetwin.report.figures.stack import Panel
-from drivetwin.report.figures.validation import build_shift_panels
-from drivetwin.report.sections.summary import build_phase_table, describe_phases
+from drivetwin.report.stack import Panel
+from drivetwin.report.summary import build_phase_table, describe_phases
+from drivetwin.report.validation import build_shift_panels
 from drivetwin.report.whole_drive import build_quality_tables, build_summary_tables
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.shifts.summary import summarize_shifts
@@ -26,13 +26,12 @@ from drivetwin.workbench.identifying import (
     parse_times,
     plot_phases,
 )
-from drivetwin.workbench.page_words import replace_options
 from drivetwin.workbench.session import Session
 from drivetwin.workbench.session_state import OpenLog, SessionState
 from drivetwin.workbench.views import widgets as ui
 from drivetwin.workbench.views.fields import ControlId, Index
 from drivetwin.workbench.views.log import Place, build_log_choice, register_log_choice
-from drivetwin.workbench.views.widgets import render_table
+from drivetwin.workbench.views.widgets import render_table, replace_options
 
 
 class Use(StrEnum):

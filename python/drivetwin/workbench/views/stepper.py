@@ -15,8 +15,8 @@ from drivetwin.channels.roles import NEEDED
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.report.blocks import Tone
 from drivetwin.report.model_verdict import STATUS_TONES
+from drivetwin.workbench.session import Sessions
 from drivetwin.workbench.session_state import SessionState
-from drivetwin.workbench.sessions import Sessions
 from drivetwin.workbench.views.widgets import Topic, make_attributes, make_topic_id
 
 

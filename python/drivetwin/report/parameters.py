@@ -55,8 +55,8 @@ from drivetwin.report.figure import (
     make_layout,
     make_trace,
 )
-from drivetwin.report.figures.validation import plot_overview
 from drivetwin.report.model_verdict import build_verdict_block, explain_identification
+from drivetwin.report.validation import plot_overview
 
 TONES = {
     Verdict.IDENTIFIED: Tone.GOOD,

@@ -56,8 +56,8 @@ from drivetwin.report.figure import (
     make_subplots,
     make_trace,
 )
-from drivetwin.report.figures.stack import Curve, Panel, Phases, stack_panels
-from drivetwin.report.figures.validation import get_shift_spans
+from drivetwin.report.stack import Curve, Panel, Phases, stack_panels
+from drivetwin.report.validation import get_shift_spans
 from drivetwin.shifts.shift import make_shift_labels
 
 _SIGMA = Display("σ")

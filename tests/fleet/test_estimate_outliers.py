@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drivetwin.fleet.mixed_model.estimate import compute_unit_limit, compute_unit_scores
+from drivetwin.fleet.estimate import compute_unit_limit, compute_unit_scores
 
 FLEETS = 4000
 FALSE_ALARMS = 0.05

@@ -15,14 +15,14 @@ from drivetwin.logs.read import read_log
 from drivetwin.pipeline import identify
 from drivetwin.report.blocks import FigureBlock, NotesBlock, TableBlock, Tone
 from drivetwin.report.html import build_report_page, render_page
-from drivetwin.report.sections.stage_results import build_stage_sections
+from drivetwin.report.stage_results import build_stage_sections
 from drivetwin.shifts.detect import detect_shifts
 from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import load_card
 from tests.report.sample import identification
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 LOG = ROOT.parent / "shared" / "logs" / "paper_like.csv"
 
 

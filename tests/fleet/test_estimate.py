@@ -13,7 +13,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.fleet.mixed_model.estimate import estimate_fleet
+from drivetwin.fleet.estimate import estimate_fleet
 from tests.fleet.toys import fill, open_store
 
 UNITS, LOGS = 15, 30

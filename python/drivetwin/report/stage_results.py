@@ -33,7 +33,7 @@ from drivetwin.report.figure import (
     make_layout,
     make_subplots,
 )
-from drivetwin.report.figures.stack import Curve, Panel, compute_full_range, plot_over_time_axis
+from drivetwin.report.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.shifts.shift import make_shift_labels
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.workbench.sessions import RunFolder, remove_dead_folders
+from drivetwin.workbench.session import RunFolder, remove_dead_folders
 
 _LIVING = """
-from drivetwin.workbench.sessions import RunFolder
+from drivetwin.workbench.session import RunFolder
 folder = RunFolder.create()
 print(folder.path, flush=True)
 input()

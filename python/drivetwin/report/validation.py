@@ -33,7 +33,7 @@ from drivetwin.report.figure import (
     make_layout,
     make_trace,
 )
-from drivetwin.report.figures.stack import (
+from drivetwin.report.stack import (
     MAX_POINTS,
     Curve,
     Panel,

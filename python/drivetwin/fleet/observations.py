@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivetwin.estimation.result.estimate import Verdict
-from drivetwin.fleet.mixed_model.mixed import FloatArray, JointEstimate, Outlier
+from drivetwin.fleet.mixed import FloatArray, JointEstimate, Outlier
 from drivetwin.fleet.store import ONE_FILE_EACH, Store
 from drivetwin.fleet.task import RowKind
 

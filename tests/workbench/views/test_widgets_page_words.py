@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.workbench.page_words import replace_options
+from drivetwin.workbench.views.widgets import replace_options
 
 ROOT = Path(__file__).parents[2] / "python" / "drivetwin"
 ABOVE = ("cli", "fleet", "calibration", "observer", "estimation/multi_log", "estimation/analysis")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from drivetwin.fleet.mixed_model.mixed import (
+from drivetwin.fleet.mixed import (
     Drift,
     FloatArray,
     IntArray,
@@ -22,7 +22,7 @@ from drivetwin.fleet.mixed_model.mixed import (
     UnitValue,
     fit_mixed_model,
 )
-from drivetwin.fleet.mixed_model.observations import (
+from drivetwin.fleet.observations import (
     LogFacts,
     Observed,
     attach_reasons,

@@ -51,11 +51,11 @@ from drivetwin.report.figure import (
     make_layout,
     make_trace,
 )
-from drivetwin.report.figures.stack import Curve, Panel, stack_panels
-from drivetwin.report.figures.validation import OUTPUTS, draw_band, plot_validation
 from drivetwin.report.find_reports import Agreement, Trial, compare_estimates
-from drivetwin.report.sections.parameters import make_parameter_cell, make_value_cell
-from drivetwin.report.sections.summary import build_fit_table, make_fit_cell
+from drivetwin.report.parameters import make_parameter_cell, make_value_cell
+from drivetwin.report.stack import Curve, Panel, stack_panels
+from drivetwin.report.summary import build_fit_table, make_fit_cell
+from drivetwin.report.validation import OUTPUTS, draw_band, plot_validation
 from drivetwin.validation.simulate_log import SIGNALS
 
 _TONES = {

@@ -42,7 +42,7 @@ from drivetwin.report.blocks import (
     make_table,
 )
 from drivetwin.report.figure import get_channel_display, get_channel_label
-from drivetwin.report.figures.validation import (
+from drivetwin.report.validation import (
     plot_friction,
     plot_further_signals,
     plot_log,

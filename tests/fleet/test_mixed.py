@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.fleet.mixed_model.mixed import Observations, fit_mixed_model
+from drivetwin.fleet.mixed import Observations, fit_mixed_model
 from tests.support.arrays import FloatArray
 from tests.support.coverage import COARSE, assert_covers, vary_draws
 from tests.support.shared_results import shared

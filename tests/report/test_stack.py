@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivetwin.report.figures.stack import decimate_around, extract_envelope
+from drivetwin.report.stack import decimate_around, extract_envelope
 from tests.report.sample import SHIFT, TIME, list_blocks, log, simulated, validation
 
 

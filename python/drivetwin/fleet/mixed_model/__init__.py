@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Mixed model of a fleet: shared values, units, ageing, outliers."""
