@@ -26,7 +26,7 @@ def test_writes_page_and_traces_and_tells_every_shift(
     page = (tmp_path / "out" / "drive.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|href)="https?:', page)
     # The drive, its two shifts, the energy.
-    assert page.count("<figure>") == 4
+    assert page.count("<figure>") == 3
     # Works of engine and road, heats, and gains of stored energy close on every row.
     names, _, *rows = (tmp_path / "out" / "drive.csv").read_text(encoding="utf-8").splitlines()
     table = np.array([[float(cell) for cell in row.split(",")] for row in rows])

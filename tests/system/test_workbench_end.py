@@ -123,7 +123,7 @@ def test_nothing_is_left(tmp_path: Path, started: Started, sent: str) -> None:
     assert _wait_for_none(process.pid) == set()
     if sent != "SIGKILL":
         assert process.returncode == 0
-        assert list(tmp_path.glob("drivetwin-*")) == []
+        assert list(tmp_path.glob(".drivetwin-*")) == []
 
 
 @pytest.mark.faults
@@ -133,16 +133,16 @@ def test_a_closed_terminal_signals_the_group_twice(tmp_path: Path, started: Star
         os.killpg(process.pid, signal.SIGHUP)
     process.communicate(timeout=30.0)
     assert _wait_for_none(process.pid) == set()
-    assert list(tmp_path.glob("drivetwin-*")) == []
+    assert list(tmp_path.glob(".drivetwin-*")) == []
 
 
 def test_the_next_start_removes_what_a_killed_run_left(tmp_path: Path, started: Started) -> None:
     killed = started()
     killed.kill()
     killed.communicate()
-    (left,) = tmp_path.glob("drivetwin-app-*")
+    (left,) = tmp_path.glob(".drivetwin-*")
     following = started()
     assert not left.exists()
     following.send_signal(signal.SIGHUP)
     following.communicate(timeout=30.0)
-    assert list(tmp_path.glob("drivetwin-*")) == []
+    assert list(tmp_path.glob(".drivetwin-*")) == []

@@ -29,4 +29,4 @@ def test_forty_tabs_do_not_mix_and_none_is_lost(place: Path, serve: Callable[...
             sessions.get(key)
     sessions.close()
     assert first not in sessions
-    assert not sessions.place.path.exists()
+    assert not sessions.place.exists()

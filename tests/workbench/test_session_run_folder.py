@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Folders of runs: those of living runs stay, those of dead ones are removed."""
+"""Folders of runs: those of living runs stay, those of killed ones go at the next start."""
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -10,55 +11,31 @@ from pathlib import Path
 
 import pytest
 
-from drivetwin.workbench.session import RunFolder, remove_dead_folders
+from drivetwin.workbench.session import make_run_folder
 
 _LIVING = """
-from drivetwin.workbench.session import RunFolder
-folder = RunFolder.create()
-print(folder.path, flush=True)
+from drivetwin.workbench.session import make_run_folder
+print(make_run_folder(), flush=True)
 input()
 """
 
 
-@pytest.fixture(autouse=True)
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def test_the_folder_of_another_process_goes_once_that_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    return tmp_path
-
-
-def test_a_run_removes_its_folder() -> None:
-    folder = RunFolder.create()
-    (folder.path / "inner").mkdir()
-    assert folder.path.stat().st_mode & 0o077 == 0
-    assert remove_dead_folders() == []
-    folder.remove()
-    assert not folder.path.exists()
-
-
-def test_the_folder_of_another_process_goes_once_that_is_killed() -> None:
+    (tmp_path / ".drivetwin-link").symlink_to(tmp_path)
     process = subprocess.Popen(
         [sys.executable, "-c", _LIVING], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert process.stdout is not None
     path = Path(process.stdout.readline().strip())
+    assert path.stat().st_mode & 0o077 == 0
     (path / "upload").write_text("x")
-    assert remove_dead_folders() == []
+    shutil.rmtree(make_run_folder())
     assert path.exists()
     process.kill()
     process.communicate()
-    assert path.exists()
-    assert remove_dead_folders() == [path]
-    assert not path.exists()
-
-
-def test_what_is_no_folder_of_a_run_stays(temporary: Path) -> None:
-    target = temporary / "target"
-    target.mkdir()
-    (target / "lock").touch()
-    (temporary / "drivetwin-app-link").symlink_to(target)
-    (temporary / "drivetwin-app-bare").mkdir()
-    (temporary / "drivetwin-app-file").touch()
-    (temporary / "other").mkdir()
-    assert remove_dead_folders() == []
-    assert len(list(temporary.iterdir())) == 5
+    own = make_run_folder()
+    assert {one.name for one in tmp_path.iterdir()} == {own.name, ".drivetwin-link"}

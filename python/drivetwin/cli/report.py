@@ -11,8 +11,7 @@ from drivetwin.cli.output import show_step
 from drivetwin.cli.requests.use import Report
 from drivetwin.errors import InputError, Where
 from drivetwin.report.blocks import Outcome
-from drivetwin.report.comparison import build_comparison_page, simulate_trials
-from drivetwin.report.find_reports import Trial
+from drivetwin.report.comparison import Trial, build_comparison_page, simulate_trials
 from drivetwin.report.html import save_page
 from drivetwin.report.results import MadeResult, open_result
 from drivetwin.shifts.detect import require_shifts

@@ -27,8 +27,7 @@ from drivetwin.fit.fit import predict_recording
 from drivetwin.fit.model_file import read_model
 from drivetwin.report.blocks import Block, Outcome, Tone, build_findings_section, make_notes
 from drivetwin.report.bus import build_prediction_table, build_predictions_page
-from drivetwin.report.comparison import build_comparison_page, make_trial_label
-from drivetwin.report.find_reports import Candidate, Trial
+from drivetwin.report.comparison import Candidate, Trial, build_comparison_page, make_trial_label
 from drivetwin.report.fit import build_prediction_blocks, build_prediction_page
 from drivetwin.report.html import save_page
 from drivetwin.report.results import MadeResult, open_result

@@ -32,15 +32,13 @@ def workbench(request: OpenWorkbench) -> Outcome:
     from drivetwin.workbench.access_control import Access
     from drivetwin.workbench.jobs import end_all
     from drivetwin.workbench.server import build_server, start_server
-    from drivetwin.workbench.session import remove_dead_folders
     from drivetwin.workbench.workspace import Folder
 
     place, access = Folder.from_path(request.folder), Access()
-    remove_dead_folders()
     app, sessions = build_server(place, _make_start(place, request), access)
     try:
         server = start_server(app, request.port)
-        _serve(server, access, place, sessions.place.path, browser=request.browser)
+        _serve(server, access, place, sessions.place, browser=request.browser)
     except KeyboardInterrupt:
         pass  # the way to end the program
     finally:

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
 
 from drivetwin._util.display_units import (
     format_significant,
@@ -14,6 +17,7 @@ from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.report.blocks import (
     Block,
@@ -31,19 +35,111 @@ from drivetwin.report.blocks import (
     make_number,
     make_table,
 )
-from drivetwin.report.figure import get_estimate_label
-from drivetwin.report.find_reports import DIFFER, Agreement, Candidate, Trial, compare_estimates
+from drivetwin.report.figure import MUTED, Figure, get_candidate_style, get_estimate_label
 from drivetwin.report.parameters import make_estimate_cell, make_value_cell
+from drivetwin.report.stack import Curve, Panel, stack_panels
 from drivetwin.report.summary import build_labelled_fits
 from drivetwin.report.together import (
-    plot_agreement,
-    plot_fit_matrix,
     plot_friction_overlay,
-    plot_trial,
 )
+from drivetwin.report.validation import OUTPUTS
 from drivetwin.shifts.shift import Shift
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.simulate_log import SIGNALS, simulate_shift
+
+DIFFER = 2.58
+"""Difference in its standard deviations from which two values differ: 1 % by chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One identification under the `name` that tables and figures give it.
+
+    `fit` by signal and phase is empty where only the twin is at hand.
+    """
+
+    name: str
+    method: str
+    estimates: Mapping[str, Estimate]
+    friction: Mapping[str, FrictionCurve]
+    fit: Mapping[str, Mapping[str, SignalFit]]
+    inputs: Mapping[str, str]
+    version: str
+
+    @classmethod
+    def from_twin(cls, name: str, twin: Twin) -> Candidate:
+        """Create a candidate from a twin file."""
+        return cls(name, twin.method, twin.parameters, twin.friction, {}, twin.inputs, twin.version)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One shift of a log, simulated by each candidate; `refused` holds the reasons of failures.
+
+    `label` names log and shift.
+    """
+
+    label: str
+    runs: Mapping[str, Validation]
+    refused: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """One parameter over the candidates, in their order; None if a candidate has no estimate.
+
+    `apart` is the largest difference of two candidates in its standard deviations (sensor
+    tolerances included). A value without an interval is held against those of the others as if it
+    were exact; None where no value with an interval has another beside it.
+    """
+
+    id: str
+    estimates: tuple[Estimate | None, ...]
+    apart: float | None
+
+    @property
+    def known(self) -> Estimate:
+        """Estimate of the first candidate that has one."""
+        return next(one for one in self.estimates if one is not None)
+
+    @property
+    def bare(self) -> tuple[int, ...]:
+        """Indices of the candidates with a value but without an interval."""
+        given = [(k, one) for k, one in enumerate(self.estimates) if one and one.value is not None]
+        return tuple(k for k, one in given if not _has_interval(one.std_total))
+
+    @property
+    def agrees(self) -> bool | None:
+        """True if the values agree within their uncertainty; None if the uncertainty is unknown."""
+        return None if self.apart is None else self.apart <= DIFFER
+
+
+def compare_estimates(candidates: Sequence[Mapping[str, Estimate]]) -> list[Agreement]:
+    """Compare every parameter that some candidate estimates, in the order of the first such one."""
+    ids = dict.fromkeys(name for one in candidates for name in one)
+    found = (_compare_parameter(name, [one.get(name) for one in candidates]) for name in ids)
+    return [one for one in found if one is not None]
+
+
+def _compare_parameter(name: str, estimates: Sequence[Estimate | None]) -> Agreement | None:
+    given = [(one.value, one.std_total) for one in estimates if one and one.value is not None]
+    if not given:
+        return None
+    values = np.array([value for value, _ in given])
+    stds = np.array([np.nan if std is None else std for _, std in given])
+    known = np.array([_has_interval(std) for _, std in given])
+    spread = np.where(known, stds, 0.0)
+    apart = [
+        abs(values[i] - values[j]) / np.hypot(spread[i], spread[j])
+        for i in range(values.size)
+        for j in range(i)
+        if known[i] or known[j]
+    ]
+    return Agreement(name, tuple(estimates), float(max(apart)) if apart else None)
+
+
+def _has_interval(std: float | None) -> bool:
+    return std is not None and np.isfinite(std) and std > 0.0
 
 
 def build_comparison_page(candidates: Sequence[Candidate], trials: Sequence[Trial]) -> Page:
@@ -103,15 +199,6 @@ def build_agreement_section(candidates: Sequence[Candidate]) -> Section:
     ]
     blocks += make_notes("Differ by more than their uncertainty", texts, Tone.DOUBTFUL)
     blocks.append(_build_parameter_table(candidates, found))
-    if judged:
-        blocks.append(
-            FigureBlock(
-                plot_agreement([one.name for one in candidates], judged),
-                "Each value against the mean of all (weighted by their uncertainty) with its total "
-                "95 % interval, in standard deviations of the parameter. Where intervals do not "
-                "overlap, the difference needs an explanation.",
-            )
-        )
     return Section("agreement", "Do they agree?", _write_headline(judged, differing), blocks)
 
 
@@ -188,11 +275,13 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
     if not trials:
         return []
     order = [one.name for one in candidates]
-    matrix = FigureBlock(
-        plot_fit_matrix(order, [one.label for one in trials], _collect_fit_percent(order, trials)),
+    rows = [(one.label, *(_get_fit_percent(one, name) for name in order)) for one in trials]
+    caption = (
         "Fit [%] of the output torque over the whole shift; a dash where the log has none or the "
-        "simulation was not possible.",
+        "simulation was not possible."
     )
+    numbers = ((name, "z.1f") for name in order)
+    matrix = make_table(caption, ("log and shift", *numbers), rows)
     shifts: list[Block] = []
     for trial in trials:
         if trial.runs:
@@ -221,17 +310,11 @@ def build_trial_sections(candidates: Sequence[Candidate], trials: Sequence[Trial
     ]
 
 
-def _collect_fit_percent(order: Sequence[str], trials: Sequence[Trial]) -> list[list[float | None]]:
-    rows: list[list[float | None]] = []
-    for name in order:
-        fits = [
-            trial.runs[name].fit.get("output_torque", {}).get("all") if name in trial.runs else None
-            for trial in trials
-        ]
-        rows.append(
-            [one.fit_percent if one and math.isfinite(one.fit_percent) else None for one in fits]
-        )
-    return rows
+def _get_fit_percent(trial: Trial, name: str) -> float | None:
+    """Return the fit of the output torque by a candidate [%]; None without one."""
+    fits = trial.runs[name].fit if name in trial.runs else {}
+    fit = fits.get("output_torque", {}).get("all")
+    return fit.fit_percent if fit and math.isfinite(fit.fit_percent) else None
 
 
 def _build_trial_table(trial: Trial, shift: Shift) -> TableBlock:
@@ -255,3 +338,29 @@ def build_origin_section(candidates: Sequence[Candidate]) -> Section:
     columns = ("identification", "method", "version", "input", "SHA-256")
     table = make_table("", columns, rows)
     return Section("origin", "Origin", "Inputs of each identification.", [table])
+
+
+def plot_trial(trial: Trial, order: Sequence[str]) -> Figure:
+    """One shift as measured and as each candidate simulates it, residuals below.
+
+    `order` lists all candidates.
+    """
+    first = next(iter(trial.runs.values()))
+    panels = []
+    for name, (title, display, weight) in OUTPUTS.items():
+        if name not in first.all_traces:
+            continue
+        seen = first.all_traces[name]
+        over = [Curve("measured", seen.time, seen.measured, MUTED, width=1.0)]
+        left = []
+        for candidate, run in trial.runs.items():
+            if name not in run.all_traces:
+                continue
+            trace, style = run.all_traces[name], get_candidate_style(order.index(candidate))
+            over.append(
+                Curve(candidate, trace.time, trace.simulated, style.colour, 1.3, style.dash)
+            )
+            difference = trace.measured - trace.simulated
+            left.append(Curve(candidate, trace.time, difference, style.colour, 1.0, listed=False))
+        panels += [Panel(title, display, over, weight), Panel("residual", display, left, 0.7)]
+    return stack_panels(panels, first.phases, height=140 + 170 * len(panels))

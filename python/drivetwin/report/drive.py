@@ -31,9 +31,6 @@ from drivetwin.report.figure import (
     SERIES,
     SIMULATED,
     Figure,
-    make_axis,
-    make_layout,
-    make_trace,
 )
 from drivetwin.report.stack import Curve, Panel, compute_full_range, plot_over_time_axis
 from drivetwin.simulation.dual_clutch import FloatArray
@@ -190,7 +187,7 @@ def build_drive_page(run: DriveRun, title: str) -> Page:
             "energy",
             "Energy",
             "Energy balance of the engine work.",
-            [FigureBlock(plot_energy(run), "Energy by part, kJ."), build_energy_table(run)],
+            [build_energy_table(run)],
         ),
     ]
     return Page(title, f"{run.time[-1]:.1f} s from standstill", sections)
@@ -330,25 +327,6 @@ def plot_maneuver(run: DriveRun, maneuver: Maneuver) -> Figure:
         Panel("power", Display("kW", 1e-3), _build_element_curves(power, time, inside, power)),
     ]
     return plot_over_time_axis(panels, compute_full_range(panels), 560)
-
-
-def plot_energy(run: DriveRun) -> Figure:
-    """Friction work by element and converter heat as bars."""
-    heat = {} if run.converter is None else {"torque converter": run.audit.converter}
-    parts = {**heat, **run.work}
-    figure = Figure(
-        make_trace(
-            "bar",
-            x=[value / 1e3 for value in parts.values()],
-            y=list(parts),
-            orientation="h",
-            marker={"color": MEASURED},
-            hovertemplate="%{y}: %{x:.1f} kJ<extra></extra>",
-        )
-    )
-    options = {"xaxis": make_axis("heat [kJ]"), "yaxis": make_axis("", autorange="reversed")}
-    figure.set_layout(make_layout(120 + 30 * len(parts), **options))
-    return figure
 
 
 def _build_speed_curves(run: DriveRun, inside: slice) -> list[Curve]:

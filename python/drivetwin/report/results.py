@@ -25,7 +25,7 @@ from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.parameters import ParameterSpec
 from drivetwin.report.blocks import VerdictBlock
 from drivetwin.report.bus import explain_bus, explain_tcu
-from drivetwin.report.find_reports import Candidate
+from drivetwin.report.comparison import Candidate
 from drivetwin.report.fit import build_fit_verdict
 from drivetwin.report.model_verdict import build_verdict_block, explain_result
 from drivetwin.twin.twin import Twin

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Several logs in one fit, predicted shifts, and several identifications side by side."""
+"""Several logs in one fit, predicted shifts, and friction of several identifications."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from drivetwin._util.display_units import Display, format_significant, get_display_unit
 from drivetwin.estimation.identification import (
@@ -18,7 +16,7 @@ from drivetwin.estimation.identification import (
     LogShare,
     Several,
 )
-from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve
 from drivetwin.estimation.result.validation import HeldOut, Outcome, Validation
 from drivetwin.findings import render
 from drivetwin.parameters import split_log_number
@@ -40,22 +38,17 @@ from drivetwin.report.blocks import (
     make_tables,
 )
 from drivetwin.report.figure import (
-    MUTED,
     Figure,
     get_candidate_style,
     get_channel_display,
     get_channel_label,
-    get_estimate_label,
     get_parameter_label,
     make_axis,
     make_layout,
-    make_trace,
 )
-from drivetwin.report.find_reports import Agreement, Trial, compare_estimates
 from drivetwin.report.parameters import make_parameter_cell, make_value_cell
-from drivetwin.report.stack import Curve, Panel, stack_panels
 from drivetwin.report.summary import build_fit_table, make_fit_cell
-from drivetwin.report.validation import OUTPUTS, draw_band, plot_validation
+from drivetwin.report.validation import draw_band, plot_validation
 from drivetwin.validation.simulate_log import SIGNALS
 
 _TONES = {
@@ -77,20 +70,10 @@ def build_joint_section(found: Identification, several: Several) -> Section:
         Tile("the logs", word, tone, f"χ² {tested.chi2:.1f} on {tested.freedom}, p {tested.p:.2g}"),
     ]
     shared = {k: one for k, one in found.estimates.items() if not split_log_number(k)[1]}
-    names = [f"log {one.number}" for one in several.logs]
-    alone = [{k: v for k, v in one.alone.items() if k in shared} for one in several.logs]
-    compared = [one for one in compare_estimates([*alone, shared]) if one.apart is not None]
     blocks: list[Block] = [
         TilesBlock(tiles),
         build_log_table(found, several),
         _build_shared_table(shared, several.logs, tested),
-        FigureBlock(
-            plot_agreement([*names, _TOGETHER], compared),
-            "Values of each log alone and of all together, relative to their common mean, "
-            "with total 95 % intervals in standard deviations of the parameter. Averaging n logs "
-            "with similar excitation narrows the part from noise by √n; the part from sensor "
-            "tolerances remains, because it is the same in all logs.",
-        ),
     ]
     return Section(
         "logs",
@@ -275,66 +258,6 @@ def prefix_log_section(section: Section, share: LogShare) -> Section:
     )
 
 
-_ROW = 0.7
-"""Share of the height of a row that the candidates of one parameter take up."""
-
-
-def plot_agreement(names: Sequence[str], found: Sequence[Agreement]) -> Figure:
-    """Deviation of each candidate from the common mean, with 95 % intervals, by parameter.
-
-    In standard deviations of the parameter (the median of the candidates'), so that narrow and wide
-    ones read alike. Parameters that cannot be judged are left out; `names` are the candidates'.
-    """
-    shown = [one for one in found if one.apart is not None]
-    figure = Figure()
-    for k, name in enumerate(names):
-        style = get_candidate_style(k)
-        points = [
-            (row + _ROW * ((k + 0.5) / len(names) - 0.5), *_standardise(one, k), one)
-            for row, one in enumerate(shown)
-            if (estimate := one.estimates[k]) is not None and estimate.value is not None
-        ]
-        figure.add_scatter(
-            x=[deviation for _, deviation, _, _ in points],
-            y=[row for row, _, _, _ in points],
-            error_x={
-                "array": [half for _, _, half, _ in points],
-                "thickness": 1.6,
-                "width": 4,
-                "color": style.colour,
-            },
-            mode="markers",
-            name=name,
-            text=[get_estimate_label(one.known) for _, _, _, one in points],
-            marker={"color": style.colour, "symbol": style.symbol, "size": 9},
-            hovertemplate="%{text}: %{x:+.2f} σ<extra>" + name + "</extra>",
-        )
-    ticks = {
-        "tickvals": list(range(len(shown))),
-        "ticktext": [get_estimate_label(one.known) for one in shown],
-        "range": [len(shown) - 0.4, -0.6],
-    }
-    figure.set_layout(
-        make_layout(
-            120 + (18 + 12 * len(names)) * len(shown),
-            xaxis=make_axis("deviation from the common mean, with 95 % interval [σ]"),
-            yaxis=make_axis("", **ticks),
-        )
-    )
-    figure.add_vline(x=0.0, line={"color": "rgba(128,128,128,0.7)", "width": 1})
-    return figure
-
-
-def _standardise(one: Agreement, k: int) -> tuple[float, float]:
-    """Deviation of the `k`-th value from the mean and its 95 % half width, over the median σ."""
-    stds = [each.std_total for each in one.estimates if each is not None and each.std_total]
-    unit = float(np.median(stds))
-    estimate = one.estimates[k]
-    assert estimate is not None
-    assert estimate.value is not None
-    return (estimate.value - one.mean) / unit, Z95 * (estimate.std_total or 0.0) / unit
-
-
 def plot_friction_overlay(
     element: str, curves: Mapping[str, FrictionCurve], order: Sequence[str]
 ) -> Figure:
@@ -360,61 +283,6 @@ def plot_friction_overlay(
             xaxis=make_axis(f"|slip| of {element} [rad/s]", rangemode="tozero"),
             yaxis=make_axis("friction coefficient μ [–]"),
             hovermode="x",
-        )
-    )
-    return figure
-
-
-def plot_trial(trial: Trial, order: Sequence[str]) -> Figure:
-    """One shift as measured and as each candidate simulates it, residuals below.
-
-    `order` lists all candidates.
-    """
-    first = next(iter(trial.runs.values()))
-    panels = []
-    for name, (title, display, weight) in OUTPUTS.items():
-        if name not in first.all_traces:
-            continue
-        seen = first.all_traces[name]
-        over = [Curve("measured", seen.time, seen.measured, MUTED, width=1.0)]
-        left = []
-        for candidate, run in trial.runs.items():
-            if name not in run.all_traces:
-                continue
-            trace, style = run.all_traces[name], get_candidate_style(order.index(candidate))
-            over.append(
-                Curve(candidate, trace.time, trace.simulated, style.colour, 1.3, style.dash)
-            )
-            difference = trace.measured - trace.simulated
-            left.append(Curve(candidate, trace.time, difference, style.colour, 1.0, listed=False))
-        panels += [Panel(title, display, over, weight), Panel("residual", display, left, 0.7)]
-    return stack_panels(panels, first.phases, height=140 + 170 * len(panels))
-
-
-def plot_fit_matrix(
-    rows: Sequence[str], columns: Sequence[str], percent: Sequence[Sequence[float | None]]
-) -> Figure:
-    """Fit [%] of the output torque: candidates over the logs that they simulate."""
-    figure = Figure(
-        make_trace(
-            "heatmap",
-            x=list(columns),
-            y=list(rows),
-            z=[[np.nan if value is None else value for value in row] for row in percent],
-            text=[["–" if value is None else f"{value:z.1f}" for value in row] for row in percent],
-            texttemplate="%{text}",
-            zmin=0.0,
-            zmax=100.0,
-            colorscale=[[0.0, "#f4f4f4"], [1.0, "#0072B2"]],
-            showscale=False,
-            hovertemplate="%{y} on %{x}: %{text} %<extra></extra>",
-        )
-    )
-    figure.set_layout(
-        make_layout(
-            130 + 34 * len(rows),
-            xaxis=make_axis("log and shift", ticks="", side="top"),
-            yaxis=make_axis("", ticks="", autorange="reversed"),
         )
     )
     return figure

@@ -3,20 +3,22 @@
 
 from __future__ import annotations
 
-import os
 import secrets
 import shutil
-import sys
 import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import wraps
 from pathlib import Path
 from typing import IO, Any, Concatenate, ParamSpec, TypeVar
 
-from drivetwin._util.atomic import write_text
+from drivetwin._util.atomic import (
+    FOLDER_PREFIX,
+    make_owner_name,
+    remove_unfinished,
+    write_text,
+)
 from drivetwin.authoring.card_text import refuse_faults
 from drivetwin.authoring.log_survey import LogSurvey
 from drivetwin.authoring.question import Key
@@ -392,75 +394,10 @@ def _make_request(
     )
 
 
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
-
-_PREFIX = "drivetwin-app-"
-_LOCK = "lock"
-
-
-@dataclass(frozen=True, eq=False)
-class RunFolder:
-    """A private folder with its lock."""
-
-    path: Path
-    lock: IO[bytes]
-
-    @classmethod
-    def create(cls) -> RunFolder:
-        """Make a folder that only this user can read, and lock it."""
-        while True:
-            path = Path(tempfile.mkdtemp(prefix=_PREFIX))
-            (path / _LOCK).touch(0o600)
-            lock = _acquire(path / _LOCK)
-            if lock is not None:  # else another run removes the folder at this moment
-                return cls(path, lock)
-
-    def remove(self) -> None:
-        """Remove the folder with its content."""
-        self.lock.close()
-        shutil.rmtree(self.path, ignore_errors=True)
-
-
-def remove_dead_folders() -> list[Path]:
-    """Remove the folders of this user's runs whose process has ended; return their paths."""
-    removed: list[Path] = []
-    for path in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
-        if not _is_own(path):
-            continue
-        lock = _acquire(path / _LOCK)
-        if lock is not None:
-            RunFolder(path, lock).remove()
-            removed.append(path)
-    return removed
-
-
-def _is_own(path: Path) -> bool:
-    """Return True for a folder, not a link to one, that belongs to this user."""
-    try:
-        owner = path.lstat().st_uid
-    except OSError:
-        return False
-    is_folder = path.is_dir() and not path.is_symlink()
-    return is_folder and (sys.platform == "win32" or owner == os.getuid())
-
-
-def _acquire(path: Path) -> IO[bytes] | None:
-    """Return the open, locked file; None if it does not exist or another process holds it."""
-    with suppress(OSError):
-        file = path.open("r+b")
-        try:
-            if sys.platform == "win32":
-                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-            else:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.close()
-            return None
-        return file
-    return None
+def make_run_folder() -> Path:
+    """Make a folder that only this user can read; those of runs that were killed are removed."""
+    remove_unfinished([Path(tempfile.gettempdir(), FOLDER_PREFIX)])
+    return Path(tempfile.mkdtemp(prefix=f"{FOLDER_PREFIX}{make_owner_name()}."))
 
 
 @dataclass(eq=False)
@@ -468,13 +405,13 @@ class Sessions:
     """All sessions of a server by an unguessable key, in a temporary folder of the run."""
 
     folder: Folder
-    place: RunFolder = field(default_factory=RunFolder.create)
+    place: Path = field(default_factory=make_run_folder)
     _held: dict[object, Session] = field(default_factory=dict)
 
     def create(self) -> str:
         """Open a session and return its key."""
         key = secrets.token_urlsafe(24)
-        scratch = Path(tempfile.mkdtemp(prefix="session-", dir=self.place.path))
+        scratch = Path(tempfile.mkdtemp(prefix="session-", dir=self.place))
         self._held[key] = Session(self.folder, scratch)
         return key
 
@@ -491,4 +428,4 @@ class Sessions:
         """End all sessions."""
         while self._held:
             self._held.popitem()[1].close()
-        self.place.remove()
+        shutil.rmtree(self.place, ignore_errors=True)
