@@ -6,10 +6,15 @@
 # other?
 
 # %%
+
 import drivetwin
 from drivetwin.cli import main
-from drivetwin.report.comparison import build_comparison_page, simulate_trials
-from drivetwin.report.find_reports import Candidate, compare_estimates
+from drivetwin.report.comparison import (
+    Candidate,
+    build_comparison_page,
+    compare_estimates,
+    simulate_trials,
+)
 from drivetwin.report.html import save_page
 
 results, twins, logs = {}, {}, {}
@@ -23,7 +28,7 @@ for name, seed in (("monday", "1"), ("tuesday", "2")):
 
 # %% Every parameter, and by how many standard deviations the two are apart.
 candidates = [Candidate.from_twin(name, twin) for name, twin in twins.items()]
-for one in compare_estimates(candidates):
+for one in compare_estimates([one.estimates for one in candidates]):
     if one.apart is not None:
         print(f"{one.id:12} {one.apart:4.1f} σ  {'agree' if one.agrees else 'differ'}")
 

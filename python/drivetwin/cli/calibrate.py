@@ -15,9 +15,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from drivetwin._util.arrays import format_json
 from drivetwin._util.atomic import compute_digest, write_text
 from drivetwin._util.optional_dependencies import get_program_version
-from drivetwin._util.plain_values import format_json
 from drivetwin._util.request import CELSIUS
 from drivetwin.calibration.calibrate import Calibration, Task
 from drivetwin.calibration.calibrate import calibrate as run_calibration
@@ -65,21 +65,19 @@ from drivetwin.export.parameters.files import (
 )
 from drivetwin.export.parameters.of_twin import collect_calibration
 from drivetwin.files.calibration_file import (
+    STOCK,
     Provenance,
+    Requirements,
+    TrialFile,
     build_calibration_document,
     build_calibration_file,
     build_certificate_document,
-    read_calibration_file,
-    write_calibration_file,
-)
-from drivetwin.files.limits_file import (
-    STOCK,
-    Requirements,
-    TrialFile,
     build_user_controller,
     load_controller_file,
     load_limits,
     load_trials,
+    read_calibration_file,
+    write_calibration_file,
 )
 from drivetwin.files.records import dump_findings
 from drivetwin.files.result_file import load_result

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from drivetwin._util.arrays import format_json
 from drivetwin._util.display_units import format_uncertainty, get_display_unit
-from drivetwin._util.plain_values import format_json
 from drivetwin.cli.fit import fit_logs
 from drivetwin.cli.identify import (
     build_outcome,
@@ -41,7 +41,7 @@ from drivetwin.report.summary import build_friction_table
 from drivetwin.twin.build import build_twin
 from drivetwin.twin.twin import Twin
 from drivetwin.validation.validated_model import JointIdentification
-from drivetwin.vehicle.vehicle_card import VehicleCard
+from drivetwin.vehicle.card import VehicleCard
 
 SUGGESTIONS, FRICTION = "suggestions.json", "friction.json"
 

@@ -17,8 +17,9 @@ from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.progress import notify_progress
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
-from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, SignalFit
+from drivetwin.estimation.result.estimate import Estimate, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
+from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.report.blocks import (
     Block,
     Cell,

@@ -23,8 +23,8 @@ from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin._util.toml import FromTable, StrictModel, format_key_path
 from drivetwin.channels.mapping_file import ChannelTable
 from drivetwin.channels.roles import get_quantity
+from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.dyno import run
-from drivetwin.dyno.names import ScenarioName
 from drivetwin.dyno.scenario_file import format_card, format_log, load_scenario
 from drivetwin.errors import RefusedError, Where
 from drivetwin.files.twin_file import TwinFile, build_twin_file, restore_twin
