@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivetwin.export.c.write import write_c
+from drivetwin.export.c import write_c
 from drivetwin.export.compiler import find_native_compiler
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import Accuracy, Signal

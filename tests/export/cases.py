@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from drivetwin.export.c.write import write_c
+from drivetwin.export.c import write_c
 from drivetwin.export.compiler import detect_platform
 from drivetwin.export.entries import InputDelays, Subject, compute_steady_start, run_fixed_step
 from drivetwin.export.fmu.build import Experiment

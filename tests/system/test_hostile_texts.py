@@ -15,7 +15,7 @@ import pytest
 
 from drivetwin.cli import main
 from drivetwin.cli.output import print_blocks, print_json
-from drivetwin.export.c.write import write_c
+from drivetwin.export.c import write_c
 from drivetwin.export.entries import Subject
 from drivetwin.export.modelica.model import write_modelica
 from drivetwin.export.parameters.content import ParameterSet, Scalar

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin.errors import InputError
-from drivetwin.export.c.write import read_model_sources, write_c
+from drivetwin.export.c import read_model_sources, write_c
 from drivetwin.export.compiler import compile_library
 from drivetwin.export.entries import Subject
 from drivetwin.simulation.dual_clutch import FloatArray

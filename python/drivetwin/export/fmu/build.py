@@ -22,7 +22,7 @@ from drivetwin._util.text import format_csv_row
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.errors import InputError, NoShiftError, Where
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.export.c.write import generate_twin_source, read_model_sources
+from drivetwin.export.c import generate_twin_source, read_model_sources
 from drivetwin.export.compiler import compile_library, detect_platform
 from drivetwin.export.entries import (
     InputDelays,

@@ -30,14 +30,15 @@ from drivetwin.logs.formats.can.open import (
     read_attached_databases,
     read_bus_frames,
 )
-from drivetwin.logs.formats.mdf_conversion import (
+from drivetwin.logs.formats.mdf_structure import (
+    MOST_INFLATION,
     ConversionError,
     Converted,
+    check_blocks,
     convert_numbers,
     convert_samples,
     convert_texts,
 )
-from drivetwin.logs.formats.mdf_integrity import MOST_INFLATION, check_blocks
 from drivetwin.logs.raw import (
     Joined,
     RawChannel,

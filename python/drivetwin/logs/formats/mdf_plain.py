@@ -25,8 +25,13 @@ from drivetwin.channels.roles import ReadOptions
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.logs.formats.can.open import has_only_frames
 from drivetwin.logs.formats.mdf import KIND, MdfRecording
-from drivetwin.logs.formats.mdf_conversion import scale_linear
-from drivetwin.logs.formats.mdf_integrity import HEADER4, Block, find_problems, parse_block
+from drivetwin.logs.formats.mdf_structure import (
+    HEADER4,
+    Block,
+    find_problems,
+    parse_block,
+    scale_linear,
+)
 from drivetwin.logs.raw import Recording
 
 _PIECE = 1 << 20

@@ -15,7 +15,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from drivetwin.errors import InputError
-from drivetwin.export.c.write import write_c
+from drivetwin.export.c import write_c
 from drivetwin.export.entries import InputDelays
 from drivetwin.simulation.dual_clutch import FrictionTable
 from tests.export.cases import (
