@@ -5,6 +5,8 @@ GENERATOR is a folder with `gen.py` and `gen.c` of an independent simulator of s
 compiles it beside the made logs. Identifies COUNT vehicles of 20 shifts from seed FIRST on, every
 fifth shift held out, and prints the tables. With `--rows FILE` vehicles are appended to a file, and
 those in it are not made again. `--clean` leaves out the errors that the plant has no law for.
+`--wrong tyre` fits a plant whose tyre does not slip, `--wrong KEY` a card with an exact number two of
+its standard deviations off.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ def main() -> int:
     parser.add_argument("count", type=int, nargs="?", default=20, help="vehicles")
     parser.add_argument("--rows", type=Path, help="file of vehicles")
     parser.add_argument("--clean", action="store_true", help="vehicles that obey the plant")
+    parser.add_argument("--wrong", default="", help="tyre, or a key of the card such as mass_kg")
     options = parser.parse_args()
     file = options.rows
     known = file.read_text(encoding="utf-8").splitlines() if file and file.exists() else []
@@ -37,7 +40,7 @@ def main() -> int:
         for seed in wanted:
             if seed in vehicles:
                 continue
-            vehicles[seed] = study_vehicle(generator, seed)
+            vehicles[seed] = study_vehicle(generator, seed, options.wrong)
             if file:
                 with file.open("a", encoding="utf-8") as rows:
                     rows.write(json.dumps(vehicles[seed]) + "\n")

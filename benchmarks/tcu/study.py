@@ -5,25 +5,35 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomlkit
 
 from benchmarks.tcu.made import Generator, list_truth
 from drivetwin.channels.units import RPM
-from drivetwin.tcu.card import load_controller_card
+from drivetwin.tcu import plant
+from drivetwin.tcu.card import USUAL, load_controller_card
 from drivetwin.tcu.outcome import identify_controller
 from drivetwin.tcu.statements import find_used_pressure, list_used
+from drivetwin.tcu.unknowns import Stated
 
 _Z95 = 1.96
+_STIFF = Stated(2e5, 0.01, "N*m", scaled=True)
+"""Torque over slip of a tyre that slips by less than a speed is rounded."""
 
 
-def study_vehicle(generator: Generator, seed: int) -> dict[str, Any]:
-    """Make and identify a vehicle; return quantities over their truth, and held-out shifts."""
+def study_vehicle(generator: Generator, seed: int, wrong: str = "") -> dict[str, Any]:
+    """Make and identify a vehicle; return quantities over their truth, and held-out shifts.
+
+    `wrong` names what of the plant is not that of the log, see `spoil_plant`.
+    """
     log, path, truth = generator.make(seed)
-    card = load_controller_card(path)
     begin = time.process_time()
-    result = identify_controller([log], card)
+    with spoil_plant(path, wrong):
+        result = identify_controller([log], load_controller_card(path))
     seconds = time.process_time() - begin
     found = result.found
     pressures = {name: find_used_pressure(found, name) for name in list_used(found.shifts)}
@@ -61,6 +71,35 @@ def study_vehicle(generator: Generator, seed: int) -> dict[str, Any]:
         "numbers": numbers,
         "shifts": shifts,
     }
+
+
+@contextmanager
+def spoil_plant(path: Path, wrong: str) -> Iterator[None]:
+    """Make the plant of a card at `path` another than that of its log.
+
+    `tyre`: no tyre that slips. A key of the card: an exact value two standard deviations above the
+    stated one. Nothing for an empty text.
+    """
+    usual = plant.list_common
+    if wrong == "tyre":
+        plant.list_common = lambda card: {**usual(card), "tyre_slip_stiffness": _STIFF}
+    elif wrong:
+        table = tomlkit.parse(path.read_text(encoding="utf-8"))
+        value, std = load_deviation(table, wrong)
+        table[wrong] = {"value": value + 2.0 * std, "std": 0.0}
+        path.write_text(tomlkit.dumps(table), encoding="utf-8")
+    try:
+        yield
+    finally:
+        plant.list_common = usual
+
+
+def load_deviation(table: Mapping[str, Any], key: str) -> tuple[float, float]:
+    """Return value and standard deviation of a key of a card, the usual one of a bare number."""
+    entry = table[key]
+    if isinstance(entry, Mapping):
+        return float(entry["value"]), float(entry["std"])
+    return float(entry), USUAL[key] * float(entry)
 
 
 def format_tables(vehicles: Sequence[Mapping[str, Any]]) -> str:
@@ -110,6 +149,9 @@ def _format_numbers(vehicles: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     yield f"identified and weak: {share:.1%} of {len(stated)} inside"
     yield f"identified beyond 3 deviations: {len(far)} of {len(known)}"
     yield f"  far off: {', '.join(far) or 'none'}"
+    valid = {str(one["seed"]) for one in vehicles if one["status"] == "valid"}
+    misled = valid.intersection(one.partition(" ")[0] for one in far)
+    yield f"vehicles valid with an identified number beyond 3 deviations: {len(misled)}"
     yield "quantity                inside  of  identified  mean z  spread of z"
     for name, group in every.items():
         apart = np.array([one[0] for one in group])

@@ -16,7 +16,7 @@ from drivetwin.errors import CardError
 from drivetwin.vehicle.schema import PriorEntry, PriorTable, RadiusEntry
 from drivetwin.vehicle.spec import PriorValue
 
-_USUAL = {
+USUAL = {
     "mass_kg": 0.05,
     "wheel_radius_m": 0.02,
     "J_engine_kgm2": 0.25,
@@ -193,5 +193,5 @@ def make_card(file: ControllerCardFile) -> ControllerCard:
 
 def _read(entry: PriorTable, kind: str) -> PriorValue:
     """Return a value with its stated or usual standard deviation."""
-    stated = entry.to_prior(lambda value: PriorValue(value, _USUAL[kind] * value))
+    stated = entry.to_prior(lambda value: PriorValue(value, USUAL[kind] * value))
     return PriorValue(stated.value, max(stated.std, _EXACT * stated.value))
