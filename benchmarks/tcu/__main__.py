@@ -5,8 +5,8 @@ GENERATOR is a folder with `gen.py` and `gen.c` of an independent simulator of s
 compiles it beside the made logs. Identifies COUNT vehicles of 20 shifts from seed FIRST on, every
 fifth shift held out, and prints the tables. With `--rows FILE` vehicles are appended to a file, and
 those in it are not made again. `--clean` leaves out the errors that the plant has no law for.
-`--wrong tyre` fits a plant whose tyre does not slip, `--wrong KEY` a card with an exact number two of
-its standard deviations off.
+`--wrong tyre` fits a plant whose tyre does not slip, `--wrong KEY` a card with an exact number two
+standard deviations off.
 """
 
 from __future__ import annotations

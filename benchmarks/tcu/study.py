@@ -8,17 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import tomlkit
 
 from benchmarks.tcu.made import Generator, list_truth
 from drivetwin.channels.units import RPM
-from drivetwin.tcu import plant
 from drivetwin.tcu.card import USUAL, load_controller_card
 from drivetwin.tcu.outcome import identify_controller
 from drivetwin.tcu.statements import find_used_pressure, list_used
-from drivetwin.tcu.unknowns import Stated
+from drivetwin.tcu.unknowns import Stated, list_common
 
 _Z95 = 1.96
 _STIFF = Stated(2e5, 0.01, "N*m", scaled=True)
@@ -80,18 +80,17 @@ def spoil_plant(path: Path, wrong: str) -> Iterator[None]:
     `tyre`: no tyre that slips. A key of the card: an exact value two standard deviations above the
     stated one. Nothing for an empty text.
     """
-    usual = plant.list_common
+    common = dict(list_common(load_controller_card(path)))
     if wrong == "tyre":
-        plant.list_common = lambda card: {**usual(card), "tyre_slip_stiffness": _STIFF}
+        common["tyre_slip_stiffness"] = _STIFF
     elif wrong:
         table = tomlkit.parse(path.read_text(encoding="utf-8"))
         value, std = load_deviation(table, wrong)
         table[wrong] = {"value": value + 2.0 * std, "std": 0.0}
         path.write_text(tomlkit.dumps(table), encoding="utf-8")
-    try:
+        common = dict(list_common(load_controller_card(path)))
+    with patch("drivetwin.tcu.plant.list_common", lambda _: common):
         yield
-    finally:
-        plant.list_common = usual
 
 
 def load_deviation(table: Mapping[str, Any], key: str) -> tuple[float, float]:

@@ -190,7 +190,6 @@ class Code(StrEnum):
     BUS_NO_DECAY = auto()
     BUS_DECAY_DAMPED = auto()
     BUS_DECAY_SAMPLED = auto()
-    BUS_DECAY_STIFF = auto()
     BUS_DECAY_SHORT = auto()
     BUS_NO_CLUTCH = auto()
     BUS_ENGINE_UNEXPLAINED = auto()
@@ -198,7 +197,6 @@ class Code(StrEnum):
     BUS_NO_METER = auto()
     BUS_CLUTCH_CARRIES = auto()
     BUS_NO_SPAN = auto()
-    BUS_K_OVER_J = auto()
     BUS_NO_RADIUS = auto()
     BUS_LOAD_OF_SPANS = auto()
 

@@ -6,7 +6,6 @@ Result tables, reports, exports and documentation derive from it.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from drivetwin.errors import InputError
@@ -139,16 +138,7 @@ _SPECS = (
 
 SPECS: dict[str, ParameterSpec] = {spec.stem: spec for spec in _SPECS}
 
-_SLOWEST, _FASTEST = 0.5, 60.0
-"""Frequencies [Hz] of the first torsional mode of a driveline: of 40 t on long shafts in the lowest
-gear (k/J of about 10 1/s²), and of a light car on short shafts (`ringdown.RING_DOWN`)."""
-
 _BUS = (
-    ParameterSpec(
-        "k_over_J", "Stiffness over inertia", "k/J", "1/s^2",
-        "k·(1/J_a + 1/J_b) = σ² + ω² of the two sides of the driveline",
-        (2.0 * math.pi * _SLOWEST) ** 2, (2.0 * math.pi * _FASTEST) ** 2, "gear",
-    ),
     ParameterSpec(
         "speed_delay", "Delay relative to the input speed", "τ", "s",
         "delay of a speed on the bus relative to the input speed", -1.0, 1.0, "channel",

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin.bus.drift import build_covariance, fit_noise, regress
+from drivetwin.bus.drift import build_covariance, fit_noise, solve_weighted
 from drivetwin.bus.recording import Signal
 from drivetwin.bus.scatter import ShiftValue
+from drivetwin.estimation.direct.momentum_balance import interpolate_parabola_minimum
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,6 @@ class AlignmentSettings:
     """Longest part of a span that is fitted as one [s]."""
     min_samples: int = 12
     """Fewest samples of a part [count]."""
-    rounds: int = 3
-    """Linearisations [count]: the third changes τ by less than a microsecond."""
 
 
 ALIGNMENT = AlignmentSettings()
@@ -92,18 +91,17 @@ def estimate_delay(spans: Sequence[JoinedSpan]) -> float | None:
     """Delay [s] of plain least squares, for a first look; None without a span."""
     if not spans:
         return None
-    late = _find_start(spans)
-    ratios = [_fit_ratio(one, late)[0] for one in spans]
-    for _ in range(ALIGNMENT.rounds):
-        ratios, late = _step(spans, ratios, late)
-    return late
+    trials = np.arange(-ALIGNMENT.longest, ALIGNMENT.longest, ALIGNMENT.step)
+    costs = [sum(_fit_ratio(one, late)[1] for one in spans) for late in trials.tolist()]
+    return interpolate_parabola_minimum(trials, np.array(costs))
 
 
-def estimate_alignment(spans: Sequence[JoinedSpan]) -> Alignment | None:
-    """Estimate delay and ratios; None without a span that is long enough."""
+def estimate_alignment(spans: Sequence[JoinedSpan], late: float | None = None) -> Alignment | None:
+    """Estimate delay and ratios about a first delay `late` [s], None to look for it; None without a
+    span that is long enough."""
     if not spans:
         return None
-    late = estimate_delay(spans) or 0.0
+    late = (estimate_delay(spans) or 0.0) if late is None else late
     ratios = [_fit_ratio(one, late)[0] for one in spans]
     made = [_linearize(one, i, late) for one, i in zip(spans, ratios, strict=True)]
     delays: list[ShiftValue] = []
@@ -115,7 +113,8 @@ def estimate_alignment(spans: Sequence[JoinedSpan]) -> Alignment | None:
 
 
 def _make_value(label: str, value: float, variance: float) -> ShiftValue:
-    return ShiftValue(label, np.array([value]), np.array([[1.0 / variance]]))
+    information = 1.0 / variance if variance > 0.0 else 0.0
+    return ShiftValue(label, np.array([value]), np.array([[information]]))
 
 
 def _fit_ratio(one: JoinedSpan, late: float) -> tuple[float, float]:
@@ -123,30 +122,6 @@ def _fit_ratio(one: JoinedSpan, late: float) -> tuple[float, float]:
     other = one.other.interpolate_smoothly(one.time + late)
     ratio = float(other @ one.values / (other @ other))
     return ratio, float(np.sum((one.values - ratio * other) ** 2))
-
-
-def _find_start(spans: Sequence[JoinedSpan]) -> float:
-    """Delay [s] of the least sum of squares."""
-    trials = np.arange(-ALIGNMENT.longest, ALIGNMENT.longest, ALIGNMENT.step)
-    costs = [sum(_fit_ratio(one, float(late))[1] for one in spans) for late in trials]
-    return float(trials[int(np.argmin(costs))])
-
-
-def _step(
-    spans: Sequence[JoinedSpan], ratios: Sequence[float], late: float
-) -> tuple[list[float], float]:
-    """Next ratios and delay of plain least squares over all spans."""
-    found, pulled, weight = [], 0.0, 0.0
-    for one, ratio in zip(spans, ratios, strict=True):
-        other, rate = _build_columns(one, ratio, late).T
-        aside = other / (other @ other)
-        free = rate - other * (aside @ rate)
-        step = float(free @ one.values) / max(float(free @ free), 1e-30)
-        found.append(float(aside @ (one.values - step * rate)))
-        pulled += float(free @ one.values)
-        weight += float(free @ free)
-    step = pulled / max(weight, 1e-30)
-    return found, late + float(np.clip(step, -ALIGNMENT.beside, ALIGNMENT.beside))
 
 
 def _build_columns(one: JoinedSpan, ratio: float, late: float) -> FloatArray:
@@ -161,7 +136,8 @@ def _linearize(one: JoinedSpan, ratio: float, late: float) -> tuple[FloatArray, 
     columns = _build_columns(one, ratio, late)
     time = one.time - one.time[0]
     size = fit_noise(time, columns, one.values, one.floor, None)
-    made = regress(columns, one.values, build_covariance(time, size, one.floor, None))
-    if made is None:
-        return np.array([ratio, 0.0]), 1e12 * np.eye(2)
-    return made.beta, made.covariance
+    weights = np.asarray(
+        np.linalg.inv(build_covariance(time, size, one.floor, None)), dtype=np.float64
+    )
+    found, information = solve_weighted(columns, one.values, weights)
+    return found, np.asarray(np.linalg.pinv(information, hermitian=True), dtype=np.float64)

@@ -32,11 +32,10 @@ from drivetwin.bus.drift import (
     regress,
 )
 from drivetwin.bus.recording import Signal, average_neighbours
-from drivetwin.bus.scatter import SQUARE, Combined, ShiftValue, combine
+from drivetwin.bus.scatter import Combined, ShiftValue, combine
 from drivetwin.bus.torque import compute_swing_response, integrate_torque
 from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.findings import Code, Number, explain
-from drivetwin.parameters import get_parameter_spec
 from drivetwin.vehicle.spec import Z95
 
 
@@ -162,28 +161,16 @@ class JointDecay:
         std = float(np.hypot(omega**2 * rate_std, rate * omega * omega_std)) / norm**3
         return rate / norm, std
 
-    def compute_square(self) -> tuple[float, float]:
-        """Square of the undamped angular frequency, σ² + ω² [1/s²], and its standard deviation."""
-        rate, omega = self.swing.rate, self.swing.omega
-        rate_std, omega_std = self.combined.std
-        std = 2.0 * float(np.hypot(rate * rate_std, omega * omega_std))
-        return rate**2 + omega**2, std
-
     def explain_implausible(self) -> str:
         """Return why this is no oscillation of a driveline; empty if it may be one."""
         frequency, damping = self.compute_frequency()[0], self.compute_damping()[0]
-        square, limits = self.compute_square()[0], get_parameter_spec(SQUARE)
-        low, high = (Number(one, limits.unit) for one in (limits.lower, limits.upper))
         if damping > DECAY.max_damping:
             return explain(Code.BUS_DECAY_DAMPED, zeta=damping, limit=DECAY.max_damping)
         if frequency * self.step > DECAY.max_sampling_share:
             shown = {"f": Number(frequency, "Hz"), "rate": Number(1.0 / self.step, "Hz")}
             return explain(Code.BUS_DECAY_SAMPLED, **shown)
-        if not limits.lower <= square <= limits.upper:
-            return explain(
-                Code.BUS_DECAY_STIFF, square=Number(square, limits.unit), low=low, high=high
-            )
-        return ""
+        longest = max(float(one.record.time[-1]) for one in self.fits)
+        return explain(Code.BUS_NO_DECAY) if frequency * longest < 1.0 else ""
 
 
 def build_columns(time: FloatArray, swing: Swing) -> FloatArray:

@@ -105,6 +105,28 @@ def regress(columns: FloatArray, values: FloatArray, covariance: FloatArray) -> 
     return Regression(beta, spread, mean, best - 0.5 * float(log_i - log_x), best)
 
 
+def weigh_beside(others: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Weights (n, n) of samples with a `covariance` (n, n), beside the columns `others` (n, m) with
+    free coefficients, which may depend on each other."""
+    inverse = np.linalg.inv(covariance)
+    across = inverse @ (others / np.maximum(np.linalg.norm(others, axis=0), 1e-300))
+    gram = across.T @ covariance @ across
+    return np.asarray(inverse - across @ np.linalg.pinv(gram, 1e-12, hermitian=True) @ across.T)
+
+
+def solve_weighted(
+    columns: FloatArray, values: FloatArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (p,) of the `columns` (n, p) in `values` (n,), with their information (p, p).
+
+    A direction that the samples do not determine has no information.
+    """
+    information = columns.T @ weights @ columns
+    unit = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    inverse = np.linalg.pinv(information / np.outer(unit, unit), 1e-9, hermitian=True)
+    return inverse @ (columns.T @ weights @ values / unit) / unit, information
+
+
 def fit_noise(
     time: FloatArray,
     columns: FloatArray,

@@ -34,7 +34,6 @@ from drivetwin.bus.scatter import (
     DELAY,
     FREQUENCY,
     RATIO,
-    SQUARE,
     Combined,
     combine,
     make_estimate,
@@ -69,8 +68,7 @@ class BusIdentification:
     """Result for one vehicle.
 
     `estimates` by id, `ratios` by gear as they were used. `decays` by gear hold the joint fits,
-    `predictions` those of decays that took no part, by label. `energies` are the slip energies [J]
-    of the closing clutch by shift, with standard deviation; `loads` are the road loads by span.
+    `predictions` those of decays that took no part, by label. `loads` are the road loads by span.
     """
 
     estimates: dict[str, Estimate]
@@ -79,7 +77,6 @@ class BusIdentification:
     decays: dict[str, JointDecay]
     predictions: dict[str, DecayPrediction]
     balances: dict[str, TorqueBalance] = field(default_factory=dict)
-    energies: dict[str, tuple[float, float]] = field(default_factory=dict)
     loads: tuple[RoadLoad, ...] = ()
     findings: tuple[Finding, ...] = ()
 
@@ -144,7 +141,6 @@ def identify_bus(
         made.decays,
         predictions,
         torques.balances,
-        torques.energies,
         torques.loads,
         tuple(made.findings),
     )
@@ -179,7 +175,7 @@ def _align(
     aligned: dict[str, Alignment] = {}
     for role in roles:
         margin = abs(late.get(role, 0.0)) + ALIGNMENT.beside
-        found = estimate_alignment(list(_list_joined(lines, role, margin)))
+        found = estimate_alignment(list(_list_joined(lines, role, margin)), late.get(role))
         combined = None if found is None else combine(found.delays)
         late.pop(role, None)
         if found is None or combined is None:
@@ -348,21 +344,19 @@ class _ResultBuilder:
         return {name: one for name, one in made.items() if one.predicted.size}
 
     def report_decays(self) -> None:
-        """Add frequency, damping and stiffness over inertia of each gear with decays."""
+        """Add frequency and damping of each gear with decays."""
         for gear in self.ratios:
             joint = self.decays.get(gear)
             if joint is None:
-                for stem in (FREQUENCY, DAMPING, SQUARE) if gear in self.refused else ():
+                for stem in (FREQUENCY, DAMPING) if gear in self.refused else ():
                     one = refuse(stem, gear, self.refused[gear])
                     self.estimates[one.id] = one
                 continue
-            note = explain(Code.BUS_K_OVER_J)
-            for stem, (value, std), text in (
-                (FREQUENCY, joint.compute_frequency(), ""),
-                (DAMPING, joint.compute_damping(), ""),
-                (SQUARE, joint.compute_square(), note),
+            for stem, found in (
+                (FREQUENCY, joint.compute_frequency()),
+                (DAMPING, joint.compute_damping()),
             ):
-                one = make_estimate(stem, gear, value, std, joint.combined, text)
+                one = make_estimate(stem, gear, *found, joint.combined)
                 self.estimates[one.id] = one
             self.findings += find_contradictions(f"the resonance in gear {gear}", joint.combined)
             if joint.combined.groups:

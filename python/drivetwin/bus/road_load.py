@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.bus.drift import regress
+from drivetwin.bus.drift import solve_weighted, weigh_beside
 from drivetwin.bus.scatter import Combined, ShiftValue, combine
 from drivetwin.bus.torque import TORQUE, TorqueBalance, TorqueSpan, build_columns, build_noise
 
@@ -27,8 +27,6 @@ _TIME = 1
 _COARSE = 0.05
 """Share by which gaps between messages attenuate 1/J of the open clutch from which its T_0 is not
 used: a few messages fall into an open clutch then."""
-_SMALLEST = 1e-6
-"""Part of a column beyond the columns before it below which it is left out."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ def _list_loads(
     late, late_std = balance.compute_dead_time()
     for one in spans:
         wanted, other = build_columns(one, late, 2)
-        columns = np.column_stack([wanted[:, :1], _drop_dependent(other)])
+        columns = np.column_stack([wanted[:, :1], other])
         covariance = build_noise(one, late, columns, 1.0 / J)[1]
         found = _fit_load(one, J, late, covariance)
         heavier = _fit_load(one, J + J_std, late, covariance)
@@ -112,21 +110,12 @@ def _fit_load(
     `covariance` (k, k) is that of the speed.
     """
     wanted, other = build_columns(one, late, 2)
-    columns = _drop_dependent(other)
-    if columns.shape[1] <= _TIME:
+    weights = weigh_beside(np.delete(other, _TIME, axis=1), covariance)
+    rest = one.speed - wanted[:, 0] / J
+    slope, information = solve_weighted(other[:, [_TIME]], rest, weights)
+    if not information[0, 0] > 0.0:
         return None
-    found = regress(columns, one.speed - wanted[:, 0] / J, covariance)
-    if found is None:
-        return None
-    return -J * float(found.beta[_TIME]), J * float(np.sqrt(found.covariance[_TIME, _TIME]))
-
-
-def _drop_dependent(columns: FloatArray) -> FloatArray:
-    """Leave out columns that the ones before make up, such as the swing of a constant torque."""
-    size = np.linalg.norm(columns, axis=0)
-    kept = columns[:, size > 0.0]
-    left = np.abs(np.diag(np.linalg.qr(kept / size[size > 0.0], mode="r")))
-    return np.asarray(kept[:, left > _SMALLEST])
+    return -J * float(slope[0]), J / float(np.sqrt(information[0, 0]))
 
 
 def _get_zero(one: TorqueSpan, alone: TorqueBalance | None) -> tuple[float, float]:

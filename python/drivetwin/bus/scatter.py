@@ -257,7 +257,7 @@ METHOD = "bus, joint over shifts"
 """Method of an estimate."""
 _SPEEDS = {"output_speed": "output speed", "engine_speed": "engine speed"}
 
-RATIO, FREQUENCY, DAMPING, SQUARE = "ratio", "f_d", "zeta", "k_over_J"
+RATIO, FREQUENCY, DAMPING = "ratio", "f_d", "zeta"
 DELAY, DEAD_TIME, ENGINE, TOTAL = "speed_delay", "torque_delay", "J_engine", "J_total"
 VEHICLE, MASS, LOAD = "J_vehicle_out", "mass_over_eta", "road_load"
 

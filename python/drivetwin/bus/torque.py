@@ -24,10 +24,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin.bus.drift import Swing, build_covariance, fit_noise
+from drivetwin.bus.drift import Swing, build_covariance, fit_noise, solve_weighted, weigh_beside
 from drivetwin.bus.recording import Signal, average_neighbours
 from drivetwin.bus.scatter import Combined, ShiftValue, combine
 
@@ -244,30 +243,11 @@ def _fit_span(
     `scale` is 1/J [1/(kg m^2)], by which errors of the torque become such of the speed.
     """
     wanted, other = build_columns(one, late, size, share)
-    columns = np.column_stack([wanted, other])
-    square = scale**2
-    message, covariance = build_noise(one, late, columns, scale)
-    nothing = ShiftValue(one.label, np.zeros(size), np.zeros((size, size)))
-    try:
-        factor = cho_factor(covariance, lower=True)
-    except LinAlgError:
-        return nothing, 0.0
-    weighted = cho_solve(factor, columns)
-    whole, pulled = columns.T @ weighted, weighted.T @ one.speed
-    aside = np.linalg.pinv(whole[size:, size:], hermitian=True)
-    across = whole[:size, size:] @ aside
-    information = whole[:size, :size] - across @ whole[size:, :size]
-    slope = pulled[:size] - across @ pulled[size:]
-    unit = np.sqrt(np.maximum(np.diag(whole)[:size], 1e-300))
-    axes_size, axes = np.linalg.eigh(information / np.outer(unit, unit))
-    kept = np.where(axes_size > 1e-9, axes_size, 0.0)
-    inverse = np.where(kept > 0.0, 1.0 / np.where(kept > 0.0, kept, 1.0), 0.0)
-    value = (axes * inverse) @ axes.T @ (slope / unit) / unit
-    information = (axes * kept) @ axes.T * np.outer(unit, unit)
-    inner = cho_solve(factor, message) / square
-    beside = weighted[:, size:]
-    wrong = np.trace(inner) - np.trace(aside @ (beside.T @ message @ beside)) / square
-    return ShiftValue(one.label, value, information), float(max(wrong, 0.0))
+    message, covariance = build_noise(one, late, np.column_stack([wanted, other]), scale)
+    weights = weigh_beside(other, covariance)
+    value, information = solve_weighted(wanted, one.speed, weights)
+    wrong = max(float(np.sum(weights * message)), 0.0) / scale**2
+    return ShiftValue(one.label, value, information), wrong
 
 
 def build_noise(
@@ -379,27 +359,3 @@ def compute_swing_response(
     state = lfilter(gains, np.array([1.0, -np.exp(x)]), values.astype(complex))
     moved = state.real - swing.rate / swing.omega * state.imag
     return np.asarray(np.interp(time, grid, moved))
-
-
-@dataclass(frozen=True, eq=False)
-class ClosingClutch:
-    """A clutch that closes over `span` [s]; the engine speed is `late` [s]."""
-
-    engine: Signal
-    inlet: Signal
-    torque: Signal
-    late: float
-    span: Span
-
-    def compute_slip_energy(self, dead: float, J: float) -> float:
-        """Heat [J] of the clutch, ∫ (T - J_e·dω_e/dt)·(ω_e - ω_in) dt.
-
-        `dead` [s] is the dead time of the torque, `J` [kg m^2] the inertia of the engine.
-        """
-        grid = np.arange(*self.span, TORQUE.fine)
-        if grid.size < 5:
-            return 0.0
-        fast = self.engine.interpolate(grid + self.late)
-        slip = fast - self.inlet.interpolate(grid)
-        carried = self.torque.interpolate(grid + dead) - J * np.gradient(fast, grid)
-        return float(np.trapezoid(carried * slip, grid))

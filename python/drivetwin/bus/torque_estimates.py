@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inertias, mass, dead time and slip energy of a vehicle, as far as its logs determine them."""
+"""Inertias, mass, dead time and road load of a vehicle, as far as its logs determine them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,6 @@ from drivetwin.bus.scatter import (
 )
 from drivetwin.bus.torque import (
     TORQUE,
-    ClosingClutch,
     TorqueBalance,
     TorqueSpan,
     balance_held,
@@ -42,12 +41,10 @@ from drivetwin.vehicle.card import RatioCard
 
 @dataclass(frozen=True, eq=False)
 class TorqueResults:
-    """Estimates by id; `balances` by gear, the open clutch under an empty name; slip energies [J]
-    with standard deviation by shift."""
+    """Estimates by id; `balances` by gear, the open clutch under an empty name; road loads."""
 
     estimates: dict[str, Estimate] = field(default_factory=dict)
     balances: dict[str, TorqueBalance] = field(default_factory=dict)
-    energies: dict[str, tuple[float, float]] = field(default_factory=dict)
     loads: tuple[RoadLoad, ...] = ()
     findings: tuple[Finding, ...] = ()
 
@@ -110,8 +107,7 @@ def estimate_torques(
     loads = estimate_loads(held, balances, alone)
     _add_load(estimates, loads)
     _add_dead_time(estimates, balances)
-    energies = {} if alone is None else _list_energies(lines, late, alone, estimates)
-    return TorqueResults(estimates, balances, energies, loads)
+    return TorqueResults(estimates, balances, loads)
 
 
 def _add(estimates: dict[str, Estimate], one: Estimate) -> None:
@@ -246,33 +242,3 @@ def _add_dead_time(estimates: dict[str, Estimate], balances: Mapping[str, Torque
     most = max((one.combined for one in balances.values()), key=lambda one: one.count)
     value, std = float(found[0][0]), float(np.sqrt(found[1][0, 0]))
     _add(estimates, make_estimate(DEAD_TIME, "", value, std, most))
-
-
-def _list_energies(
-    lines: Sequence[Timeline],
-    late: Mapping[str, float],
-    alone: TorqueBalance,
-    estimates: Mapping[str, Estimate],
-) -> dict[str, tuple[float, float]]:
-    """Slip energy of each closing clutch; its deviation is that of inertia and dead time."""
-    (J, J_std), dead = alone.compute_inertia(), estimates[DEAD_TIME]
-    if dead.value is None:
-        return {}
-    found = {}
-    for line in lines:
-        signals = line.log.signals
-        if not {"engine_speed", "engine_torque"} <= signals.keys():
-            continue
-        three = (signals[one] for one in ("engine_speed", "input_speed", "engine_torque"))
-        engine, inlet, torque = three
-        for shift in line.shifts:
-            span = shift.find_phase(PhaseName.CLUTCH_CLOSES)
-            if span is None or shift.find_phase(PhaseName.NEUTRAL) is None:
-                continue
-            one = ClosingClutch(engine, inlet, torque, late.get("engine_speed", 0.0), span)
-            here = one.compute_slip_energy(dead.value, J)
-            by_inertia = one.compute_slip_energy(dead.value, J + J_std) - here
-            later = dead.value + (dead.std_total or 0.0)
-            by_time = one.compute_slip_energy(later, J) - here
-            found[f"{line.log.label}, {shift.label}"] = here, float(np.hypot(by_inertia, by_time))
-    return found

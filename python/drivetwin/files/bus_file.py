@@ -94,14 +94,6 @@ class BusPredictionRecord(Record):
         return cls(shift=shift, samples=one.predicted.size, inside=one.share_inside, **sizes)
 
 
-class BusEnergyRecord(Record):
-    """Slip energy [J] of a closing clutch, with standard deviation."""
-
-    shift: str
-    energy: FiniteFloat
-    std: FiniteFloat
-
-
 class BusLoadRecord(Record):
     """Road load over η [N m] at the output shaft, with the mean output speed [rad/s] of a span."""
 
@@ -123,7 +115,6 @@ class BusFile(Record):
     shifts: list[BusShiftRecord]
     decays: dict[str, BusDecayRecord]
     predictions: list[BusPredictionRecord] = Field(default_factory=list)
-    energies: list[BusEnergyRecord] = Field(default_factory=list)
     loads: list[BusLoadRecord] = Field(default_factory=list)
     settings: dict[str, str] = Field(default_factory=dict)
     findings: list[FindingRecord]
@@ -160,10 +151,6 @@ def build_bus_file(
         predictions=[
             BusPredictionRecord.from_prediction(name, one)
             for name, one in found.predictions.items()
-        ],
-        energies=[
-            BusEnergyRecord(shift=name, energy=value, std=std)
-            for name, (value, std) in found.energies.items()
         ],
         loads=[
             BusLoadRecord(

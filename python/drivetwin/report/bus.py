@@ -80,7 +80,6 @@ class BusOutcome:
             self.verdict,
             *_build_parameters(found),
             build_phase_table(found.timelines),
-            *_build_energies(found),
             *_build_loads(found),
             *_build_decay_tables(found),
             *_build_prediction_table(found),
@@ -102,7 +101,7 @@ class BusOutcome:
                 "shifts",
                 "Shifts",
                 "Phases from the ratio of the speeds and, where recorded, the slip of the clutch.",
-                [build_phase_table(found.timelines), *_build_energies(found)],
+                [build_phase_table(found.timelines)],
             ),
             Section(
                 "road-load",
@@ -231,15 +230,6 @@ def build_phase_table(timelines: Sequence[Timeline]) -> TableBlock:
                 name = ""
     columns = ("shift", "phase", ("at s", ".2f"), ("from begin s", ".2f"), ("length s", ".2f"))
     return make_table("Shifts and their phases", columns, rows)
-
-
-def _build_energies(found: BusIdentification) -> list[Block]:
-    rows = []
-    for shift, (energy, std) in found.energies.items():
-        value, half = format_uncertainty(energy * 1e-3, Z95 * std * 1e-3)
-        rows.append((shift, value, half))
-    columns = ("shift", ("slip energy kJ", "s"), ("± 95 %", "s"))
-    return make_tables("Slip energy of the closing clutch, from engine torque", columns, rows)
 
 
 def _build_loads(found: BusIdentification) -> list[Block]:
