@@ -17,6 +17,7 @@ from drivetwin.bus.decay import DecayPrediction
 from drivetwin.bus.identify import BusIdentification
 from drivetwin.bus.phases import BusShift
 from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.files.fit_file import LogsFile
 from drivetwin.files.records import (
     FindingRecord,
     Interval,
@@ -104,19 +105,16 @@ class BusLoadRecord(Record):
     std: FiniteFloat
 
 
-class BusFile(Record):
+class BusFile(LogsFile):
     """Result of bus logs, SI. `parameters` by id, `ratios` by gear as they were used."""
 
     schema_name: SchemaName = BUS_SCHEMA
-    version: str
-    logs: list[str]
     ratios: dict[str, FiniteFloat]
     parameters: dict[str, ParameterRecord]
     shifts: list[BusShiftRecord]
     decays: dict[str, BusDecayRecord]
     predictions: list[BusPredictionRecord] = Field(default_factory=list)
     loads: list[BusLoadRecord] = Field(default_factory=list)
-    settings: dict[str, str] = Field(default_factory=dict)
     findings: list[FindingRecord]
 
 
@@ -128,7 +126,6 @@ def build_bus_file(
 ) -> BusFile:
     """Build the file of a result, with `remarks` of the reader and the options of the command."""
     return BusFile(
-        version=get_program_version(),
         logs=list(logs),
         ratios=found.ratios,
         parameters={
@@ -196,12 +193,10 @@ class PredictedShiftRecord(Record):
     measured_duration: OptionalFloat
 
 
-class TcuFile(Record):
+class TcuFile(LogsFile):
     """Result of logs of a gearbox control, SI. `parameters` by name, `noise` [rad/s] by speed."""
 
     schema_name: SchemaName = TCU_SCHEMA
-    version: str
-    logs: list[str]
     status: ModelStatus
     reason: str
     shifts: dict[str, int]
@@ -209,14 +204,12 @@ class TcuFile(Record):
     parameters: dict[str, ParameterRecord]
     noise: dict[str, FiniteFloat]
     held_out: list[PredictedShiftRecord]
-    settings: dict[str, str] = Field(default_factory=dict)
 
 
 def build_tcu_file(found: TcuIdentification, settings: Mapping[str, str] | None = None) -> TcuFile:
     """Build the file of a result, with the options of the command by name."""
     kinds = [one.kind for one in found.found.shifts]
     return TcuFile(
-        version=get_program_version(),
         logs=[one.source for one in found.logs],
         status=found.status,
         reason=found.reason,

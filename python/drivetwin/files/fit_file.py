@@ -64,14 +64,21 @@ class HeldOutRecord(Record):
     fit: dict[str, FitRecord]
 
 
-class FitFile(Record):
+class LogsFile(Record):
+    """Common part of the results of logs as a whole; `settings` are the options of the command."""
+
+    schema_name: SchemaName
+    version: str = Field(default_factory=get_program_version)
+    logs: list[str]
+    settings: dict[str, str] = Field(default_factory=dict)
+
+
+class FitFile(LogsFile):
     """Result of a fit. `fit` is the agreement by log and output; `agreeing` the number of starts in
     the best minimum."""
 
     schema_name: SchemaName = FIT_SCHEMA
-    version: str
     model: str
-    logs: list[str]
     status: ModelStatus
     chi2: FiniteFloat
     cost: FiniteFloat
@@ -81,7 +88,6 @@ class FitFile(Record):
     fit: list[dict[str, FitRecord]]
     starts: list[StartRecord]
     agreeing: int
-    settings: dict[str, str] = Field(default_factory=dict)
     held_out: list[HeldOutRecord] = Field(default_factory=list)
     findings: list[FindingRecord]
 
@@ -100,7 +106,6 @@ def build_fit_file(
     names = [one.name for one in found.sought]
     values = found.values
     return FitFile(
-        version=get_program_version(),
         model=found.model.name,
         logs=list(logs),
         status=found.status,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field, FiniteFloat, model_validator
 
@@ -19,11 +19,10 @@ from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.estimation.analysis.friction_shape import ShapedFriction
 from drivetwin.estimation.identification import Identification, LogPull, LogShare
 from drivetwin.estimation.result.cause import Group
-from drivetwin.estimation.result.estimate import ExperimentRanking, LoadLaw
-from drivetwin.estimation.result.method import Method, ModelStatus
+from drivetwin.estimation.result.estimate import ExperimentRanking
+from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.validation import HeldOut, Outcome
 from drivetwin.files.records import (
-    ActuatorRecord,
     FindingRecord,
     FitRecord,
     FrictionRecord,
@@ -31,10 +30,10 @@ from drivetwin.files.records import (
     OptionalFloat,
     ParameterRecord,
     Record,
-    SchemaName,
     SuggestionRecord,
     read_record,
 )
+from drivetwin.files.twin_file import IdentifiedFile
 from drivetwin.likelihood.profile import Profile
 from drivetwin.shifts.shift import RejectedShift
 from drivetwin.vehicle.spec import ShiftKind
@@ -157,31 +156,20 @@ class CauseRecord(Record):
     is_explained: bool = True
 
 
-class ResultFile(Record):
+class ResultFile(IdentifiedFile):
     """The whole of `result.json`; all values SI."""
 
-    schema_name: SchemaName
-    version: str
-    method: Method
-    loss_law: Literal["paper", "dissipative"]
     status: ModelStatus
     cause: CauseRecord | None = None
     parameters: dict[str, ParameterRecord]
-    friction: dict[str, FrictionRecord]
-    load: LoadLaw | None = None
-    actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
     shifts: list[ShiftRecord]
     rejected: list[RejectedShift]
     fit: dict[str, dict[str, FitRecord]]
-    validity: dict[str, Interval]
-    inputs: dict[str, str]
-    settings: dict[str, Any]
     correlation: dict[str, dict[str, OptionalFloat]]
     several: SeveralRecord | None = None
     held_out: list[HeldOutRecord] = Field(default_factory=list)
     suggestions: list[SuggestionRecord] = Field(default_factory=list)
     findings: list[FindingRecord]
-    assumptions: list[str]
 
     @model_validator(mode="before")
     @classmethod

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import Field, FiniteFloat
@@ -39,6 +39,7 @@ from drivetwin.files.records import (
 )
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.added_elements import Converter
+from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.simulation.shift_control import SpeedSensor
 from drivetwin.twin.twin import Twin, TwinElement, TwinGear
 from drivetwin.vehicle.card import RATIO_TOLERANCE
@@ -109,26 +110,31 @@ class TwinParameterRecord(ParameterRecord):
     value: OptionalFloat = None
 
 
-class TwinFile(Record):
-    """The whole of `twin.toml`."""
+class IdentifiedFile(Record):
+    """Common part of a result and of a twin: method, laws, and where they come from."""
 
     schema_name: SchemaName
     version: str
-    name: str
     method: Method
-    loss_law: Literal["paper", "dissipative"]
-    transmission: TransmissionRecord
-    log: LogRecord | None = None
-    parameters: dict[str, TwinParameterRecord]
+    loss_law: LossLaw
     friction: dict[str, FrictionRecord]
     load: LoadLaw | None = None
-    covariance: CovarianceRecord | None = None
     actuators: dict[str, ActuatorRecord] = Field(default_factory=dict)
-    sensors: dict[str, SpeedSensor] = Field(default_factory=dict)
     validity: dict[str, Interval]
     inputs: dict[str, str]
     settings: dict[str, Any]
     assumptions: list[str]
+
+
+class TwinFile(IdentifiedFile):
+    """The whole of `twin.toml`."""
+
+    name: str
+    transmission: TransmissionRecord
+    log: LogRecord | None = None
+    parameters: dict[str, TwinParameterRecord]
+    covariance: CovarianceRecord | None = None
+    sensors: dict[str, SpeedSensor] = Field(default_factory=dict)
 
 
 TCU_TWIN_SCHEMA = "drivetwin/tcu-twin-1"

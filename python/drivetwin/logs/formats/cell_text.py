@@ -178,14 +178,6 @@ def check_decimal_signs(columns: Sequence[Written], file: str) -> None:
     raise FileFormatError(fault, remedy, Where(file=file))
 
 
-@dataclass(frozen=True, eq=False)
-class NumberTexts:
-    """Numbers (n,) of texts, NaN where a text is no number; `note` describes the choice."""
-
-    values: FloatArray
-    note: str
-
-
 def parse_numbers(texts: Iterable[str]) -> FloatArray:
     """Return the numbers (n,) of texts; NaN for texts that are no numbers.
 
@@ -196,8 +188,10 @@ def parse_numbers(texts: Iterable[str]) -> FloatArray:
     return np.array([float(x) if ok else np.nan for x, ok in zip(stripped, known, strict=True)])
 
 
-def select_numbers(texts: Sequence[str], codes: FloatArray) -> NumberTexts | None:
-    """Return the numbers that stand for `codes` (n,) by their texts (n,).
+def select_numbers(texts: Sequence[str], codes: FloatArray) -> tuple[FloatArray, str] | None:
+    """Return the numbers that stand for `codes` (n,) by their texts (n,), and a note.
+
+    Numbers are NaN where a text is no number; the note describes the choice.
 
     Returns None where the codes are to be taken: no text is a number, or those that are state the
     code itself and others name codes, such as `N` beside `1` and `2`.
@@ -210,7 +204,7 @@ def select_numbers(texts: Sequence[str], codes: FloatArray) -> NumberTexts | Non
     others = [text.strip() for text, number in zip(texts, is_value, strict=True) if not number]
     named = ", ".join(repr(text) for text in dict.fromkeys(others) if text)
     note = "texts that are numbers taken as values" + (f", not {named}" if named else "")
-    return NumberTexts(values, "" if same else note)
+    return values, "" if same else note
 
 
 def read_flag(texts: Iterable[str]) -> dict[str, float] | None:
@@ -438,9 +432,10 @@ def interpret_codes(texts: Sequence[str], values: FloatArray) -> CodeValues:
     faults = np.array([classify_code_text(one) is CodeMeaning.FAULT for one in texts], np.bool_)
     others = [text for text, fault in zip(texts, faults.tolist(), strict=True) if not fault]
     found = select_numbers(others, values[~faults])
+    numbers, note = (values[~faults], "") if found is None else found
     result = np.full(len(texts), np.nan)
-    result[~faults] = values[~faults] if found is None else found.values
-    return CodeValues(result, faults, found is not None, "" if found is None else found.note)
+    result[~faults] = numbers
+    return CodeValues(result, faults, found is not None, note)
 
 
 def describe_faults(texts: Sequence[str], counts: Sequence[int], size: int) -> str:

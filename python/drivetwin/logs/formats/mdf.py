@@ -11,7 +11,6 @@ import contextlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -74,12 +73,6 @@ _INTEGERS = (0, 1, 2, 3)
 
 _ALL_INVALID = 1
 """Flag of a channel of MDF 4 none of whose samples is valid."""
-
-
-@dataclass(frozen=True)
-class _Place:
-    group: int
-    index: int
 
 
 @contextmanager
@@ -152,7 +145,7 @@ class MdfRecording:
         self._factors: dict[int, float] = {}
         self.warnings: tuple[str, ...] = ()
         names = _make_group_names(mdf.groups)
-        places: list[_Place] = []
+        places: list[tuple[int, int]] = []
         columns: list[Column] = []
         timeless: list[str] = []
         for number, group in enumerate(mdf.groups):
@@ -167,7 +160,7 @@ class MdfRecording:
                 if index == mdf.masters_db[number]:
                     continue
                 unit = self._get_unit(number, index)
-                places.append(_Place(number, index))
+                places.append((number, index))
                 columns.append(Column(channel.name, unit, names[number], empty=empty))
         self._places = tuple(places)
         self.columns: Sequence[Column] = tuple(columns)
@@ -206,7 +199,7 @@ class MdfRecording:
         place, column = self._places[index], self.columns[index]
         where = Where(file=str(self._path), channel=str(column))
         with handle_parser_errors(KIND, self._path):
-            time = self._load_stamps(place.group)
+            time = self._load_stamps(place[0])
             first, count = 0, time.size
             if window is not None:
                 first, last = np.searchsorted(time, window)
@@ -277,22 +270,25 @@ class MdfRecording:
             self._stamps = (group, subtract_origin(master, self.origin))
         return self._stamps[1]
 
-    def _load_samples(self, place: _Place, first: int, count: int) -> tuple[Converted, Any]:
+    def _load_samples(
+        self, place: tuple[int, int], first: int, count: int
+    ) -> tuple[Converted, Any]:
         """Values with the conversion of the file, and the recorder's marks for invalid ones."""
+        number, index = place
         wanted = {
-            "group": place.group,
-            "index": place.index,
+            "group": number,
+            "index": index,
             "record_offset": first,
             "record_count": count,
             "samples_only": True,
             "ignore_invalidation_bits": True,  # marked samples are left out here, and counted
         }
-        group = self._mdf.groups[place.group]
-        self._loaded[place.group] += 1
+        group = self._mdf.groups[number]
+        self._loaded[number] += 1
         whole = count == int(group.channel_group.cycles_nr)
-        if whole and _KEPT_FROM * self._loaded[place.group] >= len(group.channels):
+        if whole and _KEPT_FROM * self._loaded[number] >= len(group.channels):
             self._records.keep(group)
-        channel = group.channels[place.index]
+        channel = group.channels[index]
         raw, marks = self._mdf.get(raw=True, **wanted)
         if getattr(channel, "flags", 0) & _ALL_INVALID:
             marks = np.ones(len(raw), dtype=np.bool_)

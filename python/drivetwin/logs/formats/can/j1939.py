@@ -84,14 +84,6 @@ class Assembled:
     receiver: int = 0xFF
 
 
-@dataclass(frozen=True)
-class Transport:
-    """All complete messages in order of completion; `faults` count what was incomplete, by why."""
-
-    messages: tuple[Assembled, ...]
-    faults: Counter[str] = field(default_factory=Counter)
-
-
 @dataclass
 class _Transfer:
     group: int
@@ -105,7 +97,7 @@ def assemble_messages(frames: Frames) -> Transport:
     """Put multi-packet messages together from all frames of a log."""
     groups = decode_group(frames.identifier)
     chosen = np.flatnonzero(frames.extended & np.isin(groups, (_CONNECTION, _DATA)))
-    assembly = _Assembly()
+    assembly = Transport()
     senders, receivers = decode_sender(frames.identifier), decode_receiver(frames.identifier)
     for index in chosen.tolist():
         key = (int(frames.bus[index]), int(senders[index]), int(receivers[index]))
@@ -117,16 +109,20 @@ def assemble_messages(frames: Frames) -> Transport:
             assembly.open_transfer(key, payload, time)
         else:
             assembly.append_packet(key, payload, time)
-    return assembly.close_transfers()
+    assembly.close_transfers()
+    return assembly
 
 
-class _Assembly:
-    """Open transfers by (bus, sender, receiver)."""
+class Transport:
+    """Transfers by (bus, sender, receiver): complete `messages` in order of completion.
+
+    `faults` count the incomplete ones by cause.
+    """
 
     def __init__(self) -> None:
         self._open: dict[tuple[int, int, int], _Transfer] = {}
-        self._messages: list[Assembled] = []
-        self._faults: Counter[str] = Counter()
+        self.messages: list[Assembled] = []
+        self.faults: Counter[str] = Counter()
         self._last: dict[tuple[int, int, int, int], tuple[bytes, float]] = {}
 
     def is_repeat(self, place: tuple[int, int, int, int], payload: bytes, time: float) -> bool:
@@ -140,7 +136,7 @@ class _Assembly:
 
     def open_transfer(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
         if len(payload) < 8:
-            self._faults["announcement cut short"] += 1
+            self.faults["announcement cut short"] += 1
             return
         if payload[0] == _ABORT:
             for pair in (key, (key[0], key[2], key[1])):
@@ -152,14 +148,14 @@ class _Assembly:
         group = int.from_bytes(payload[5:8], "little")
         self._drop_transfer(key, "replaced by the next before its end")
         if not 8 < length <= _LONGEST or payload[3] != -(-length // _BYTES):
-            self._faults["announced with an impossible length"] += 1
+            self.faults["announced with an impossible length"] += 1
             return
         self._open[key] = _Transfer(group, length, payload[3], time)
 
     def append_packet(self, key: tuple[int, int, int], payload: bytes, time: float) -> None:
         transfer = self._open.get(key)
         if transfer is None or len(payload) < 2:
-            self._faults["packet without announcement"] += 1
+            self.faults["packet without announcement"] += 1
             return
         if time - transfer.time > _TIMEOUT:
             self._drop_transfer(key, "paused too long")
@@ -177,20 +173,20 @@ class _Assembly:
             del self._open[key]
             data = b"".join(transfer.parts)
             if len(data) < transfer.length:
-                self._faults["last packet too short"] += 1
+                self.faults["last packet too short"] += 1
                 return
-            self._messages.append(
+            self.messages.append(
                 Assembled(time, transfer.group, key[1], key[0], data[: transfer.length], key[2])
             )
 
-    def close_transfers(self) -> Transport:
+    def close_transfers(self) -> None:
+        """Drop the transfers that the log does not complete."""
         for key in list(self._open):
             self._drop_transfer(key, "cut by the end of the log")
-        return Transport(tuple(self._messages), self._faults)
 
     def _drop_transfer(self, key: tuple[int, int, int], reason: str) -> None:
         if self._open.pop(key, None) is not None:
-            self._faults[reason] += 1
+            self.faults[reason] += 1
 
 
 _BYTE = 8
