@@ -7,12 +7,12 @@ import os
 from collections.abc import Iterable, Mapping, Sequence, Set
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from drivetwin._util.atomic import compute_digest
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages, notify_progress
-from drivetwin.channels.filling import Filling
 from drivetwin.channels.mapping import Fallback, Mapped, combine_specs, resolve_roles
 from drivetwin.channels.mapping_file import read_mapping, read_project_mapping
 from drivetwin.channels.recognition import check_commands
@@ -349,26 +349,18 @@ def _load_column(recording: Recording, spec: ChannelSpec) -> int:
     return min(picked, key=lambda one: recording.columns[one].empty)
 
 
-@dataclass(frozen=True)
-class _Conversion:
-    """Conversion of a column by its `spec`; the result is in the SI unit of `unit`."""
+def _convert(
+    spec: ChannelSpec, unit: Unit, time: FloatArray, values: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return stamps and values (n,) of a column by its `spec`, the values in the SI of `unit`.
 
-    spec: ChannelSpec
-    unit: Unit
-
-    def convert_time(self, time: FloatArray) -> FloatArray:
-        return time if self.spec.time_shift == 0.0 else time + self.spec.time_shift
-
-    def convert_values(self, values: FloatArray) -> FloatArray:
-        spec, unit = self.spec, self.unit
-        # An array that stays the same keeps the properties that are remembered for it.
-        if (spec.sign, spec.scale, spec.offset) != (1.0, 1.0, 0.0):
-            values = spec.sign * (spec.scale * values + spec.offset)
-        return values if (unit.factor, unit.offset) == (1.0, 0.0) else unit.to_si(values)
-
-    def convert_filling(self, filling: Filling) -> Filling:
-        time, values = self.convert_time(filling.time), self.convert_values(filling.values)
-        return replace(filling, time=time, values=values)
+    An array that stays the same keeps the properties that are remembered for it.
+    """
+    if spec.time_shift != 0.0:
+        time = time + spec.time_shift
+    if (spec.sign, spec.scale, spec.offset) != (1.0, 1.0, 0.0):
+        values = spec.sign * (spec.scale * values + spec.offset)
+    return time, values if (unit.factor, unit.offset) == (1.0, 0.0) else unit.to_si(values)
 
 
 def read_channels(
@@ -432,19 +424,14 @@ def _make_checked_channel(
     notes = [report(Code.RECORDING, "", place, text=note) for note in raw.notes]
     unit = spec.unit if spec.unit is not None else raw.unit
     where = Where(file=file, channel=spec.source)
-    conversion = _Conversion(spec, resolve_channel_unit(unit, quantity, where))
-    channel = Channel(
-        role=role,
-        quantity=quantity,
-        time=conversion.convert_time(raw.time),
-        values=conversion.convert_values(raw.values),
-        source_name=raw.name,
-        source_unit=unit or "",
-    )
+    convert = partial(_convert, spec, resolve_channel_unit(unit, quantity, where))
+    channel = Channel(role, quantity, *convert(raw.time, raw.values), raw.name, unit or "")
     computed = quantity in AUXILIARY or get_command_element(role) is not None
     filling = None if computed else raw.filling
-    measured = None if filling is None else conversion.convert_filling(filling)
-    channel, filled = replace_filling(channel, measured)
+    if filling is not None:
+        time, values = convert(filling.time, filling.values)
+        filling = replace(filling, time=time, values=values)
+    channel, filled = replace_filling(channel, filling)
     checked, found = check_channel(channel, file)
     held = channel.filling is None and checked.raster is not None
     findings = [*notes, *_check_unit_override(spec, raw), *filled, *found]
