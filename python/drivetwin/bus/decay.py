@@ -34,6 +34,7 @@ from drivetwin.bus.drift import (
 from drivetwin.bus.recording import Signal, average_neighbours
 from drivetwin.bus.scatter import Combined, ShiftValue, combine
 from drivetwin.bus.torque import compute_swing_response, integrate_torque
+from drivetwin.estimation.direct.resonance import Windows, compute_misfits
 from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.findings import Code, Number, explain
 from drivetwin.vehicle.spec import Z95
@@ -318,21 +319,20 @@ def _find_start(records: Sequence[DecayRecord]) -> Swing | None:
         for omega in 2.0 * np.pi * np.geomspace(slowest, fastest, DECAY.frequencies)
         for damping in DECAY.dampings
     ]
-    return min(trials, key=lambda swing: sum(_compute_log_rms(one, swing) for one in records))
+    windows = Windows.stack([one.time for one in records], [one.values for one in records])
+    sizes = np.array([one.time.size for one in records])
+    least = sizes * np.array([one.floor for one in records]) ** 2
+
+    def score(swing: Swing) -> float:
+        each = np.full((len(records), 2), (swing.rate, swing.omega))
+        return float(sizes @ np.log(compute_misfits(windows, each) + least))
+
+    return min(trials, key=score)
 
 
 def _compute_step(records: Sequence[DecayRecord]) -> float:
     """Longest median sample interval [s] of the records."""
     return max(float(np.median(np.diff(one.time))) for one in records)
-
-
-def _compute_log_rms(one: DecayRecord, swing: Swing) -> float:
-    """Negative log likelihood of a decay in white noise; a quadratic trend stands for a drift."""
-    columns = np.column_stack([build_columns(one.time, swing), one.time**2])
-    q, _ = np.linalg.qr(columns)
-    left = one.values - one.values.mean()
-    left = left - q @ (q.T @ left)
-    return 0.5 * one.time.size * float(np.log(left @ left + one.time.size * one.floor**2))
 
 
 def _compute_chance(

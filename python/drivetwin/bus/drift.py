@@ -47,13 +47,11 @@ class NoiseSize:
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Coefficients (p,) with covariance (p, p), the mean (n,) and the log likelihood.
+    """Mean (n,) of the best coefficients and log likelihood.
 
     `best` is the log likelihood at the coefficients, comparable between sets of columns.
     """
 
-    beta: FloatArray
-    covariance: FloatArray
     mean: FloatArray
     log_likelihood: float
     best: float
@@ -91,18 +89,16 @@ def regress(columns: FloatArray, values: FloatArray, covariance: FloatArray) -> 
         weighted = cho_solve(factor, columns)
         information = columns.T @ weighted
         inner = cho_factor(information)
-        beta = cho_solve(inner, weighted.T @ values)
-        spread = cho_solve(inner, np.eye(beta.size))
     except (LinAlgError, ValueError):
         return None
-    mean = columns @ beta
+    mean = columns @ cho_solve(inner, weighted.T @ values)
     residual = values - mean
     square = residual @ cho_solve(factor, residual)
     log_k = 2.0 * np.sum(np.log(np.diag(factor[0])))
     log_x = np.linalg.slogdet(columns.T @ columns)[1]
     log_i = 2.0 * np.sum(np.log(np.diag(inner[0])))
     best = -0.5 * float(log_k + square)
-    return Regression(beta, spread, mean, best - 0.5 * float(log_i - log_x), best)
+    return Regression(mean, best - 0.5 * float(log_i - log_x), best)
 
 
 def weigh_beside(others: FloatArray, covariance: FloatArray) -> FloatArray:
