@@ -34,7 +34,7 @@ from benchmarks.estimation.validity import (
     make_log,
     withhold,
 )
-from drivetwin._util.progress import record_stages
+from benchmarks.stage_clock import record_stages
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.direct.load_balance import AERO

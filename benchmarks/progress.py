@@ -22,8 +22,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from benchmarks.stage_clock import record_stages
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.progress import TABLE, attach_listener, record_stages
+from drivetwin._util.progress import TABLE, attach_listener
 from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.calibrate import Task as CalibrationTask
 from drivetwin.calibration.maneuver import OperatingPoint

@@ -19,7 +19,6 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from time import process_time
 
 Listener = Callable[[float, str], None]
 """Called with the share done (0 to 1, never falling) and what is being done."""
@@ -96,36 +95,6 @@ TABLE = Path(__file__).with_name("stage_seconds.toml")
 """Measured CPU seconds of each stage by computation."""
 
 
-@dataclass
-class StageClock:
-    """Measured stages: `seconds` and numbers of `planned` entries, by (computation, stage)."""
-
-    seconds: dict[tuple[str, str], float] = field(default_factory=dict)
-    planned: dict[tuple[str, str], float] = field(default_factory=dict)
-
-    def compute_means(self) -> dict[str, dict[str, float]]:
-        """Compute the expected seconds of each planned entry; some runs may have skipped it."""
-        means: dict[str, dict[str, float]] = {}
-        for (computation, name), seconds in self.seconds.items():
-            count = self.planned.get((computation, name), 0.0)
-            means.setdefault(computation, {})[name] = seconds / count if count else seconds
-        return means
-
-
-_clock: ContextVar[StageClock | None] = ContextVar("drivetwin_stage_clock", default=None)
-
-
-@contextmanager
-def record_stages() -> Iterator[StageClock]:
-    """Measure the CPU time of all stages that this thread enters inside the block."""
-    clock = StageClock()
-    token = _clock.set(clock)
-    try:
-        yield clock
-    finally:
-        _clock.reset(token)
-
-
 @dataclass(frozen=True)
 class TimedStages:
     """Successive stages of a computation; the first one is never skipped.
@@ -148,21 +117,13 @@ class TimedStages:
         `text` describes the stage; empty keeps the previous text.
         """
         start, end = self.compute_span(name, number)
-        clock, began = _clock.get(), process_time()
-        try:
-            with scale_progress(start, end, text):
-                yield
-        finally:
-            if clock is not None:
-                key = self.computation, name
-                clock.seconds[key] = clock.seconds.get(key, 0.0) + process_time() - began
-                if number == 0 and name == next(filter(self._count_entries, self.names)):
-                    self._plan(clock)
+        with scale_progress(start, end, text):
+            yield
 
     def compute_span(self, name: str, number: int = 0) -> tuple[float, float]:
         """Compute start and end (0 to 1) of an entry in the time of all stages."""
         seconds = _read_table().get(self.computation, {})
-        entries = {one: self._count_entries(one) for one in self.names}
+        entries = {one: self.count_entries(one) for one in self.names}
         whole = sum(seconds.get(one, 0.0) * count for one, count in entries.items())
         if whole == 0.0:
             return 0.0, 1.0
@@ -171,13 +132,9 @@ class TimedStages:
         own = seconds.get(name, 0.0)
         return (before + number * own) / whole, (before + (number + 1) * own) / whole
 
-    def _count_entries(self, name: str) -> float:
+    def count_entries(self, name: str) -> float:
+        """Return the number of entries of a stage."""
         return self.counts.get(name, 1)
-
-    def _plan(self, clock: StageClock) -> None:
-        for name in self.names:
-            key = self.computation, name
-            clock.planned[key] = clock.planned.get(key, 0.0) + self._count_entries(name)
 
 
 @cache
