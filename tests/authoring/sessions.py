@@ -11,7 +11,7 @@ from typing import Any
 from drivetwin.authoring.card_text import format_card
 from drivetwin.authoring.log_survey import survey_log
 from drivetwin.authoring.questions import Sources
-from drivetwin.authoring.session import CardOptions, Session, parse_options
+from drivetwin.authoring.session import Session, parse_options
 from drivetwin.channels.mapping import Mapped
 from drivetwin.channels.mapping_file import read_mapping
 from drivetwin.vehicle.card import VehicleCard, load_card
@@ -47,8 +47,8 @@ def make_session(
 ) -> Session:
     """Return a session with its options answered."""
     sources = Sources("truck") if log is None else Sources("truck", survey(log, mapping))
-    options = CardOptions(dict(single or {}), list(elements), list(sensors))
-    return Session(parse_options(options, sources), sources)
+    answers = parse_options(sources, dict(single or {}), list(elements), list(sensors))
+    return Session(answers, sources)
 
 
 def make_draft(

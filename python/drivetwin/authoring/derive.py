@@ -37,18 +37,6 @@ SAME_RATIOS = 1e-6
 
 
 @dataclass(frozen=True)
-class GearboxElement:
-    """The element that makes a gear, with its ratios in the dual-clutch form."""
-
-    gear: str
-    ratio: float
-    element: str
-    kind: str
-    i_c: float
-    i_out: float
-
-
-@dataclass(frozen=True)
 class GearboxFit:
     """A built-in gearbox whose gears have the ratios of a log, and the largest difference."""
 
@@ -83,8 +71,8 @@ def match_gearboxes(ratios: Sequence[float]) -> list[GearboxFit]:
 
 
 @cache
-def reduce_gears(name: str, gears: tuple[str, ...]) -> tuple[GearboxElement, ...]:
-    """Return the elements of neighbouring `gears` (from low to high) of a gearbox.
+def reduce_gears(name: str, gears: tuple[str, ...]) -> dict[str, ElementRatios]:
+    """Return the element of each of neighbouring `gears` of a gearbox, from low to high.
 
     Raises CardError where the gears have no common dual-clutch form, with the reason.
     """
@@ -128,17 +116,7 @@ def reduce_gears(name: str, gears: tuple[str, ...]) -> tuple[GearboxElement, ...
             f"{name}: {twice} makes several of the gears {', '.join(gears)}",
             "write a card for each pair of gears: --gears LOW,HIGH",
         )
-    return tuple(
-        GearboxElement(
-            gear,
-            round(found[gear].ratio, 6),
-            found[gear].element,
-            box.elements[found[gear].element].kind.value,
-            round(found[gear].i_c, 6),
-            round(found[gear].i_out, 6),
-        )
-        for gear in gears
-    )
+    return {gear: found[gear] for gear in gears}
 
 
 def refuse_irreducible(name: str) -> None:
@@ -190,11 +168,12 @@ def _derive_gearbox(answers: Answers) -> Iterator[tuple[Key, Answer]]:
     elements = reduce_gears(name, names)
     yield (
         ("gears", "ratios"),
-        Answer(tuple(StatedNumber.compute(one.ratio) for one in elements), note=note),
+        Answer(tuple(StatedNumber.compute(one.ratio) for one in elements.values()), note=note),
     )
-    yield ("gears", "elements"), Answer(tuple(one.element for one in elements), note=note)
-    for one in elements:
-        yield ("elements", one.element, "kind"), Answer(one.kind, note=note)
+    yield ("gears", "elements"), Answer(tuple(one.element for one in elements.values()), note=note)
+    for one in elements.values():
+        kind = load_gearbox(name).elements[one.element].kind.value
+        yield ("elements", one.element, "kind"), Answer(kind, note=note)
         for part, ratio in (("i_c", one.i_c), ("i_out", one.i_out)):
             yield ("elements", one.element, part), Answer(StatedNumber.compute(ratio), note=note)
 

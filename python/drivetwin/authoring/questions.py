@@ -144,8 +144,8 @@ def _make_box_gears_question(box: str, fit: GearboxFit | None, stated: tuple[str
             elements = reduce_gears(box, names)
         except CardError as fault:
             raise ValueError(f"{fault.what}; {fault.remedy}") from fault
-        _refuse_unnamed(stated, tuple(one.element for one in elements))
-        return tuple(one.gear for one in elements)
+        _refuse_unnamed(stated, tuple(one.element for one in elements.values()))
+        return tuple(elements)
 
     default = None
     if fit is not None:

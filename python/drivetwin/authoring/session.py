@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from drivetwin.authoring.derive import GEOMETRY, derive_answers
 from drivetwin.authoring.log_estimates import LogEstimates, estimate_entries
@@ -42,28 +42,27 @@ ELEMENT_PARTS: dict[str, Parser] = {
 """Parts of an element that may be stated, each with its parser."""
 
 
-@dataclass(frozen=True)
-class CardOptions:
-    """Texts of the options: `single` by option, and those that may be repeated."""
+def parse_options(
+    sources: Sources,
+    single: Mapping[str, str],
+    elements: Sequence[str] = (),
+    sensors: Sequence[str] = (),
+) -> dict[Key, Answer]:
+    """Return the answers that options give; raises InputError that names option and reason.
 
-    single: Mapping[str, str] = field(default_factory=dict)
-    elements: Sequence[str] = ()
-    sensors: Sequence[str] = ()
-
-
-def parse_options(options: CardOptions, sources: Sources) -> dict[Key, Answer]:
-    """Return the answers that options give; raises InputError that names option and reason."""
-    _refuse_conflicts(options.single)
+    `single` are the texts by option; `elements` and `sensors` those of options that are repeated.
+    """
+    _refuse_conflicts(single)
     answers: dict[Key, Answer] = {}
-    for text in options.sensors:
+    for text in sensors:
         key, answer = _parse_sensor_option(text, sources)
         answers[key] = answer
-    for text in options.elements:
+    for text in elements:
         answers.update(_parse_element_option(text))
     for option, key in ORDER.items():
-        if option in options.single:
+        if option in single:
             known = derive_answers(answers, None)
-            answers[key] = _answer_question(option, options.single[option], known, sources)
+            answers[key] = _answer_question(option, single[option], known, sources)
     return answers
 
 

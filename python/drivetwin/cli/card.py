@@ -17,7 +17,7 @@ from drivetwin.authoring.log_estimates import name_pressures
 from drivetwin.authoring.log_survey import LogSurvey, survey_log
 from drivetwin.authoring.question import Question
 from drivetwin.authoring.questions import Sources
-from drivetwin.authoring.session import CardOptions, Session, parse_options
+from drivetwin.authoring.session import Session, parse_options
 from drivetwin.authoring.stated_number import parse_name
 from drivetwin.cli.input_files import find_mapping
 from drivetwin.cli.output import (
@@ -51,8 +51,8 @@ def new(request: NewCard) -> Outcome:
     sources = Sources(_make_default_name(output), survey)
     if survey is not None and survey.remark and not request.as_json:
         print_paragraph(f"{survey.name} gives no ratios: {survey.remark}")
-    options = CardOptions(given, request.element, request.sensor)
-    session = Session(parse_options(options, sources), sources)
+    answers = parse_options(sources, given, request.element, request.sensor)
+    session = Session(answers, sources)
     can_ask = sys.stdin.isatty() and sys.stdout.isatty() and not request.as_json
     is_draft = request.draft or (from_log is not None and not can_ask)
     if is_draft:

@@ -114,22 +114,11 @@ def estimate_parameter(seen: Observed, known: Mapping[str, LogFacts]) -> JointEs
     if data is None:
         return None
     sound = select_plausible(data.value, data.unit)
-    first = _fit(data, sound)
-    if first is None:
-        return None
     found, sound = _fit_rejecting_outliers(data, sound)
     if found is None:
         return None
-    return _assemble_estimate(seen, known, _FitBasis(data, found, sound))
-
-
-@dataclass(frozen=True, eq=False)
-class _FitBasis:
-    """Basis of the conclusions; `sound` (n,) is the mask of the logs that took part."""
-
-    data: _Data
-    fit: MixedFit
-    sound: Mask
+    outliers = _collect_outliers(data, found, sound, known)
+    return replace(_assemble_estimate(seen, data, found, sound), outliers=outliers)
 
 
 def _collect_data(seen: Observed, known: Mapping[str, LogFacts]) -> _Data | None:
@@ -218,10 +207,8 @@ def _fit_rejecting_outliers(data: _Data, sound: Mask) -> tuple[MixedFit | None, 
     return _fit(data, sound, intervals=True), sound
 
 
-def _assemble_estimate(
-    seen: Observed, known: Mapping[str, LogFacts], end: _FitBasis
-) -> JointEstimate:
-    data, found = end.data, end.fit
+def _assemble_estimate(seen: Observed, data: _Data, found: MixedFit, sound: Mask) -> JointEstimate:
+    """Assemble the conclusions of a fit, in which the `sound` logs (n,) took part."""
     nothing = np.full(data.value.size, np.nan)
     spread = bool(found.sigma.size)
     return JointEstimate(
@@ -236,8 +223,8 @@ def _assemble_estimate(
         spread_ci95=(float(found.sigma_ci[0, 0]), float(found.sigma_ci[0, 1])) if spread else None,
         excess=found.excess,
         drifts=_collect_drifts(data, found),
-        units=_collect_units(end),
-        outliers=_collect_outliers(end, known),
+        units=_collect_units(data, found, sound),
+        outliers=(),
         notes=data.notes,
         points=Points(
             data.readings[:, 0] if data.fields else nothing,
@@ -267,38 +254,39 @@ def _collect_drifts(data: _Data, found: MixedFit) -> tuple[Drift, ...]:
     )
 
 
-def _collect_units(end: _FitBasis) -> tuple[UnitValue, ...]:
+def _collect_units(data: _Data, found: MixedFit, sound: Mask) -> tuple[UnitValue, ...]:
     """Collect the deviations of the units."""
-    if not end.fit.sigma.size:
+    if not found.sigma.size:
         return ()
-    deviation, unit = end.fit.deviation[:, 0], end.data.unit
+    deviation, unit = found.deviation[:, 0], data.unit
     scores = compute_unit_scores(deviation)
     bound = compute_unit_limit(deviation.size)
     return tuple(
         UnitValue(
             unit=name,
-            logs=int(np.sum((unit == k) & end.sound)),
+            logs=int(np.sum((unit == k) & sound)),
             deviation=float(deviation[k]),
-            std=float(end.fit.deviation_std[k, 0]),
+            std=float(found.deviation_std[k, 0]),
             score=float(scores[k]) if np.isfinite(scores[k]) else None,
             odd=bool(abs(scores[k]) > bound),
         )
-        for k, name in enumerate(end.data.names)
+        for k, name in enumerate(data.names)
     )
 
 
-def _collect_outliers(end: _FitBasis, known: Mapping[str, LogFacts]) -> tuple[Outlier, ...]:
+def _collect_outliers(
+    data: _Data, found: MixedFit, sound: Mask, known: Mapping[str, LogFacts]
+) -> tuple[Outlier, ...]:
     """Logs that were left out, the farthest first."""
-    data = end.data
-    score = end.fit.residual / np.sqrt(end.fit.variance)
-    places = sorted(np.flatnonzero(~end.sound), key=lambda k: -abs(score[k]))
+    score = found.residual / np.sqrt(found.variance)
+    places = sorted(np.flatnonzero(~sound), key=lambda k: -abs(score[k]))
     return tuple(
         Outlier(
             log=data.logs[k],
             path=known[data.logs[k]].path,
             unit=data.names[data.unit[k]],
             value=float(data.value[k]),
-            expected=float(data.value[k] - end.fit.residual[k]),
+            expected=float(data.value[k] - found.residual[k]),
             score=float(score[k]),
             reason="",
         )

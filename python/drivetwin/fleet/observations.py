@@ -34,9 +34,10 @@ def attach_reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEs
 
     def add_reason(one: JointEstimate, outlier: Outlier) -> Outlier:
         others = [name for name in also[outlier.log] if name != one.parameter]
+        side = "above" if outlier.score > 0.0 else "below"
         parts = [
-            f"{abs(outlier.score):.1f} standard deviations {_describe_side(outlier)} the value "
-            f"expected for unit {outlier.unit}"
+            f"{abs(outlier.score):.1f} standard deviations {side} the value expected for unit "
+            f"{outlier.unit}"
         ]
         if others:
             parts.append(f"so are its {', '.join(others)}")
@@ -49,10 +50,6 @@ def attach_reasons(store: Store, found: Sequence[JointEstimate]) -> list[JointEs
         replace(one, outliers=tuple(add_reason(one, outlier) for outlier in one.outliers))
         for one in found
     ]
-
-
-def _describe_side(outlier: Outlier) -> str:
-    return "above" if outlier.score > 0.0 else "below"
 
 
 def collect_output_fits(store: Store) -> dict[str, float]:

@@ -151,12 +151,8 @@ LOAD_LABELS = WlseLabels(
 )
 
 
-@dataclass(frozen=True, eq=False)
-class _Stages:
-    """The paper's stages on one shift; `by` names the method and, of several shifts, which."""
-
-    by: str
-    stages: PaperShift
+_Stages = tuple[str, PaperShift]
+"""The paper's stages on one shift, after the method and, of several shifts, the shift's name."""
 
 
 def build_stage_sections(found: Identification) -> list[Section]:
@@ -192,15 +188,16 @@ def _collect_stages(found: Identification) -> list[_Stages]:
     names = [f"Shift {name}, the paper's method" for name in make_shift_labels(found.shifts)]
     if len(stages) < 2 or len(stages) != len(names):
         names = ["The paper's method"] * len(stages)
-    return [_Stages(name, one) for name, one in zip(names, stages, strict=True)]
+    return list(zip(names, stages, strict=True))
 
 
 def _build_grid_blocks(one: _Stages, stage: str, parameter: str, labels: WlseLabels) -> list[Block]:
     """Build figure and table of a grid search, with any doubt about it between the two."""
-    fit: GridFit = getattr(one.stages, stage)
-    doubt = render(one.stages.doubts.get(parameter, ()))
+    by, stages = one
+    fit: GridFit = getattr(stages, stage)
+    doubt = render(stages.doubts.get(parameter, ()))
     text = (
-        f"{one.by}, weighted least squares (Fig. 6): samples whose own quotient lies in the "
+        f"{by}, weighted least squares (Fig. 6): samples whose own quotient lies in the "
         "plausible range weigh 1, others 0.01; the grid value of least RMS error is kept. Noise "
         "in the differenced speed biases it."
     )
@@ -230,12 +227,12 @@ def build_grid_table(fit: GridFit, labels: WlseLabels, tone: Tone = Tone.GOOD) -
 
 def _build_ring_blocks(shifts: Iterable[_Stages]) -> list[Block]:
     blocks: list[Block] = []
-    for one in shifts:
-        ring = one.stages.ring
+    for by, stages in shifts:
+        ring = stages.ring
         if ring is None:
             continue
         text = (
-            f"{one.by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, read from the extremes "
+            f"{by}: {ring.f_d:.3f} Hz, damping ratio {ring.zeta:.4f}, read from the extremes "
             "of the averaged curve."
         )
         blocks.append(FigureBlock(plot_ringdown(ring), text))
@@ -243,7 +240,5 @@ def _build_ring_blocks(shifts: Iterable[_Stages]) -> list[Block]:
 
 
 def _list_refusals(shifts: Iterable[_Stages], stage: str) -> list[Block]:
-    texts = [
-        f"{one.by}: {one.stages.refusals[stage]}" for one in shifts if stage in one.stages.refusals
-    ]
+    texts = [f"{by}: {one.refusals[stage]}" for by, one in shifts if stage in one.refusals]
     return make_notes("Not possible here", texts, Tone.DOUBTFUL)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -54,15 +53,6 @@ _ACCELERATION = Display("m/s²")
 _SPEED = Display("rad/s")
 _COLUMNS = 2
 _SECONDS = Display("s")
-
-
-@dataclass(frozen=True, eq=False)
-class _Band:
-    """Median and 95 % band (n,) of a signal over the units."""
-
-    low: FloatArray
-    middle: FloatArray
-    high: FloatArray
 
 
 def plot_profiles(found: Calibration) -> Figure:
@@ -144,7 +134,7 @@ def _sample(signal: Signal, time: FloatArray) -> FloatArray:
     return np.interp(time, signal.time, signal.values)
 
 
-def _simulate_bands(found: Calibration, one: Assessment) -> tuple[_Band, _Band]:
+def _simulate_bands(found: Calibration, one: Assessment) -> tuple[FloatArray, FloatArray]:
     """Bands of the vehicle's acceleration change and of the on-coming element's slip."""
     shift = found.task.maneuver
     draws = found.fresh.select(slice(0, _DRAWN))
@@ -156,20 +146,22 @@ def _simulate_bands(found: Calibration, one: Assessment) -> tuple[_Band, _Band]:
     return _compute_band(acceleration), _compute_band(columns[:, 1])
 
 
-def _compute_band(values: FloatArray) -> _Band:
-    low, middle, high = np.nanpercentile(values, (_BAND[0], 50.0, _BAND[1]), axis=0)
-    return _Band(low, middle, high)
+def _compute_band(values: FloatArray) -> FloatArray:
+    """Lower end of the 95 % band of a signal over the units, median, and upper end (3, n)."""
+    return np.asarray(np.nanpercentile(values, (_BAND[0], 50.0, _BAND[1]), axis=0))
 
 
-def _draw_bands(time: FloatArray, bands: dict[str, tuple[_Band, _Band]], which: int) -> list[Curve]:
+def _draw_bands(
+    time: FloatArray, bands: dict[str, tuple[FloatArray, FloatArray]], which: int
+) -> list[Curve]:
     curves = []
     for name, both in bands.items():
-        one, colour = both[which], _COLOURS[name]
+        (low, middle, high), colour = both[which], _COLOURS[name]
         curves += [
-            Curve(f"{name}, 2.5 %", time, one.low, colour, width=0.5, listed=False),
-            Curve(f"{name}, 97.5 %", time, one.high, colour, width=0.5, listed=False,
+            Curve(f"{name}, 2.5 %", time, low, colour, width=0.5, listed=False),
+            Curve(f"{name}, 97.5 %", time, high, colour, width=0.5, listed=False,
                   fill=_FILLS[name]),
-            Curve(name, time, one.middle, colour),
+            Curve(name, time, middle, colour),
         ]  # fmt: skip
     return curves
 
