@@ -12,7 +12,7 @@ import pytest
 
 from drivetwin.workbench.views.widgets import replace_options
 
-ROOT = Path(__file__).parents[2] / "python" / "drivetwin"
+ROOT = Path(__file__).parents[3] / "python" / "drivetwin"
 ABOVE = ("cli", "fleet", "calibration", "observer", "estimation/multi_log", "estimation/analysis")
 """Packages whose messages the workbench never shows."""
 ELSEWHERE = ("workbench/server.py", "report/results.py", "vehicle/spec.py",
