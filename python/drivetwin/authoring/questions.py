@@ -288,12 +288,6 @@ def _widen(limits: tuple[float, float] | None, note: str) -> Answer | None:
     return Answer((float(f"{low:.2g}"), float(f"{high:.2g}")), Origin.GUESS, note)
 
 
-def find_next(answers: Answers, sources: Sources) -> Question | None:
-    """Return the first question without an answer; None if there is none."""
-    questions = iterate_questions(answers, sources)
-    return next((one for one in questions if one.key not in answers), None)
-
-
 def list_open_questions(answers: Answers, sources: Sources) -> list[Question]:
     """List the questions that have neither an answer nor a default."""
     filled: dict[Key, Answer] = dict(answers)

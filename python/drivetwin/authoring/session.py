@@ -23,7 +23,6 @@ from drivetwin.authoring.question import (
 from drivetwin.authoring.questions import (
     SENSOR_ROLES,
     Sources,
-    find_next,
     iterate_questions,
     list_open_questions,
     list_stated_elements,
@@ -258,7 +257,8 @@ class Session:
 
     def _find_next(self) -> Question | None:
         known = self.answers
-        return find_next(known, self._update_sources(known))
+        questions = iterate_questions(known, self._update_sources(known))
+        return next((one for one in questions if one.key not in known), None)
 
     def _update_sources(self, answers: Answers) -> Sources:
         survey = self._sources.survey

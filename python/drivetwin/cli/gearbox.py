@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,6 @@ from drivetwin.drive import (
 from drivetwin.errors import InputError
 from drivetwin.export.modelica.model import format_package
 from drivetwin.gearbox import (
-    Gearbox,
     build_network_elements,
     describe_ratio_differences,
     list_builtin_gearboxes,
@@ -29,7 +29,7 @@ from drivetwin.gearbox import (
     solve_gear,
 )
 from drivetwin.gearbox import reduce as reduce_shift
-from drivetwin.report.blocks import Block, Outcome, Page, TextBlock, Tone, make_notes
+from drivetwin.report.blocks import Block, Outcome, TextBlock, Tone, make_notes
 from drivetwin.report.drive import (
     build_drive_page,
     build_energy_table,
@@ -84,7 +84,9 @@ def gearbox(request: ShowGearbox) -> Outcome:
         return Outcome(document={"builtin": list(names)}, lines=names)
     box = load_gearbox(request.card)
     if request.output is not None:
-        _write_modelica(box, request.output)
+        elements, ends = build_network_elements(box), (box.input, box.output)
+        package = format_package(box.name, elements, note=box.name, ends=ends)
+        write_text(request.output, package)
     gear = request.gear
     names = (gear,) if gear is not None else tuple(each.name for each in box.gears)
     gears = [solve_gear(box, name) for name in names]
@@ -100,14 +102,6 @@ def gearbox(request: ShowGearbox) -> Outcome:
     return Outcome(blocks, {"gearbox": box.name, "gears": listed, "warnings": warnings}, files)
 
 
-def _write_modelica(box: Gearbox, path: Path) -> None:
-
-    ends = (box.input, box.output)
-    write_text(
-        path, format_package(box.name, build_network_elements(box), note=box.name, ends=ends)
-    )
-
-
 FIGURE, TRACES = "drive.html", "drive.csv"
 
 
@@ -120,22 +114,16 @@ def drive(request: Drive) -> Outcome:
     title = f"{box.name}, {chosen.name}"
     with show_step(f"driving {box.name}"):
         motion = run(box, chosen, plan)
-        files = _write_outputs(request.output, motion, title) if request.output else ()
+        files: Sequence[Path] = ()
+        if request.output is not None:
+            page, traces = build_drive_page(motion, title), format_traces(motion)
+            files = write_texts(request.output, {FIGURE: page, TRACES: traces})
     blocks = [
         *(TextBlock(title), build_shift_table(motion), build_energy_table(motion)),
         *make_notes("Warnings", motion.warnings, Tone.DOUBTFUL),
     ]
     names = {"gearbox": box.name, "powertrain": chosen.name}
     return Outcome(blocks, _describe_drive(motion) | names, files)
-
-
-def _write_outputs(folder: Path, motion: DriveRun, title: str) -> tuple[Path, ...]:
-    """Write figure and traces, both or none."""
-    texts: dict[str, str | Page] = {
-        FIGURE: build_drive_page(motion, title),
-        TRACES: format_traces(motion),
-    }
-    return write_texts(folder, texts)
 
 
 def _describe_drive(motion: DriveRun) -> dict[str, Any]:

@@ -29,24 +29,17 @@ def find_mapping(channels: Path | None, log: Path) -> Mapped:
     return read_project_mapping(log) if channels is None else read_mapping(channels)
 
 
-def _load_twin_card(twin: Twin, vehicle: Path | None) -> VehicleCard:
-    """Return the card in the file `vehicle`, without one the twin's own.
-
-    Both remember the channel mapping of the twin.
-    """
-    if vehicle is None:
-        return twin.build_card()
-    return replace(load_card(vehicle), remembered=twin.mapping)
-
-
 def read_twin_log(
     twin: Twin, log: Path, vehicle: Path | None = None, channels: Path | None = None
 ) -> tuple[ShiftLog, VehicleCard]:
     """Read a log for use with a twin, and the card in the file `vehicle` or the twin's own.
 
-    Units and options that come from the twin are shown. Raises the typed errors of the readers.
+    Both cards remember the channel mapping of the twin; units and options that come from it are
+    shown. Raises the typed errors of the readers.
     """
-    card = _load_twin_card(twin, vehicle)
+    card = twin.build_card()
+    if vehicle is not None:
+        card = replace(load_card(vehicle), remembered=twin.mapping)
     with show_step(f"reading {log.name}"):
         recording = read_log(log, card, find_mapping(channels, log))
     show_findings(one for one in recording.findings if one.code in RECALLED)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from drivetwin._util.atomic import ignore_interrupts
+from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.cli.output import print_line
 from drivetwin.cli.requests.desk import OpenWorkbench
-from drivetwin.errors import MissingExtraError
 from drivetwin.report.blocks import Outcome
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _LINK_PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><titl
 
 def workbench(request: OpenWorkbench) -> Outcome:
     """Start the server, open the browser, and serve until the program is ended."""
-    _require_dash()
+    import_extra("dash", "app", "the workbench", request.folder)
     from drivetwin.workbench.access_control import Access
     from drivetwin.workbench.jobs import end_all
     from drivetwin.workbench.server import build_server, start_server
@@ -69,15 +69,6 @@ def _launch_browser(link: str, private: Path) -> None:
     page = private / "workbench.html"
     page.write_text(_LINK_PAGE.format(link), encoding="utf-8")
     typer.launch(page.as_uri())
-
-
-def _require_dash() -> None:
-    try:
-        import dash  # noqa: F401
-    except ImportError:
-        raise MissingExtraError(
-            "the workbench needs the library dash", 'pip install "drivetwin[app]"'
-        ) from None
 
 
 def _make_start(place: Folder, request: OpenWorkbench) -> Start:

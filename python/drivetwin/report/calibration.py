@@ -152,9 +152,10 @@ def build_calibration_page(
 
 
 def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Section]:
+    unit = " of the nominal unit" if isinstance(found.after.control, ClosedLoop) else ""
     profiles = FigureBlock(
         plot_profiles(found),
-        f"Pressures at the clutches and engine torque{_name_unit(found)} before (dotted, grey) and "
+        f"Pressures at the clutches and engine torque{unit} before (dotted, grey) and "
         "after; acceleration change of the vehicle and slip with 95 % bands over the units. Time "
         "from the request.",
     )
@@ -189,10 +190,6 @@ def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Sec
         ),
         Section("definitions", "Metrics", "Definition and source.", [_build_definitions()]),
     ]
-
-
-def _name_unit(found: Calibration) -> str:
-    return " of the nominal unit" if isinstance(found.after.control, ClosedLoop) else ""
 
 
 def _build_tiles(found: Calibration) -> TilesBlock:
@@ -300,12 +297,9 @@ def _describe_confidence(found: Calibration) -> str:
         f"{100.0 * one.worst_share:.2f} % of all units stay below the worst value drawn. "
         "Only the stated spread and the identified covariance are drawn: wear is not. "
         "The promised value is kept by "
-        f"95 % of the units of {_describe_types(found)} vehicle types that the log leaves possible."
+        f"95 % of the units of {100.0 * found.task.settings.promise_confidence:.0f} % of the "
+        "vehicle types that the log leaves possible."
     )
-
-
-def _describe_types(found: Calibration) -> str:
-    return f"{100.0 * found.task.settings.promise_confidence:.0f} % of the"
 
 
 def _build_statistics(found: Calibration) -> TableBlock:

@@ -35,15 +35,6 @@ _KEY = TypeAdapter(list[str | int])
 _EXISTING = {"keep": "keep it", "replace": "replace it"}
 
 
-def _build_form_start() -> list[Component]:
-    """Build the begin of the form; the fields follow from the log."""
-    return [
-        html.H3("New card"),
-        ui.make_row(ui.make_button("Begin a card from the log", "begin-card")),
-        html.Div(id="form-content"),
-    ]
-
-
 def _register_form(page: ui.Page) -> None:
     """Register the begin of a form, and its fields."""
     _register_fields(page)
@@ -265,7 +256,9 @@ def layout() -> list[Component]:
         html.Div(id="card-files"),
         html.Div(id="card-content"),
         html.Div(id="edit-content"),
-        *_build_form_start(),
+        html.H3("New card"),
+        ui.make_row(ui.make_button("Begin a card from the log", "begin-card")),
+        html.Div(id="form-content"),
     ]
 
 
