@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.estimation.rough_count import FAR
 from drivetwin.estimation.result.estimate import Z95
+from tools.result_blocks.accuracy import FAR
 
 ALL_ON = "all on"
 """Variant without anything disabled."""

@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: MIT
 """Identification of made actuators from commands and measured pressures of the dynamometer.
 
-    python -m benchmarks.actuator [COUNT]
+    python -m benchmarks.actuator [COUNT] [--write]
 
 Each log has a clutch that is filled twice at standstill and once in a shift, by a controller with
-a task of 10 ms; pressure at 1 kHz with 0.07 bar of noise, rounded to 10 Pa. Prints how many dead
-times lie within 5 ms and kiss pressures within 2 %, the coverage of the 95 % intervals by
-parameter, and the CPU time per log. Wanted: at least 9 of 10 each, coverage at least 90 %.
+a task of 10 ms; pressure at 1 kHz with 0.07 bar of noise, rounded to 10 Pa. Prints the coverage of
+the 95 % intervals by parameter, how many dead times lie within 5 ms and kiss pressures within 2 %,
+and the CPU time per log. Wanted: at least 9 of 10 each, coverage at least 90 %.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
+from typing import Any
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin.actuator.model import QUANTITIES, ActuatorModel, IdentifiedActuator
+from benchmarks.raw_results import add_options, finish_study
+from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.channels.units import BAR
 from drivetwin.dyno.scenario import ControlledActuator, Program
 from drivetwin.estimation.actuators import identify_actuator
@@ -67,39 +69,47 @@ def record(actuator: ControlledActuator, random: np.random.Generator) -> Pressur
     return PressureRecord(actuator.compute_command(_DURATION), stamps, pressure)
 
 
-def list_errors(found: IdentifiedActuator, truth: ActuatorModel) -> tuple[FloatArray, FloatArray]:
-    """Return the errors (7,) and whether the 95 % intervals hold them, 1 or 0 (7,)."""
-    errors = found.model.values - truth.values
-    return errors, (np.abs(errors) <= Z95 * found.std).astype(np.float64)
+def study_actuator(number: int) -> list[dict[str, Any]]:
+    """Identify a made actuator; return one row for each of its quantities."""
+    random = np.random.default_rng([40, number])
+    actuator = make_actuator(random)
+    found = identify_actuator([record(actuator, random)], USUAL)
+    rows = zip(QUANTITIES, found.model.values, actuator.model.values, found.std, strict=True)
+    return [
+        {
+            "seed": number,
+            "kind": QUANTITIES[name].label,
+            "name": name,
+            "sort": "identified",
+            "apart": (value - truth) / std,
+            "truth": truth,
+            "error": value - truth,
+            "width": Z95 * std / abs(truth),
+        }
+        for name, value, truth, std in rows
+    ]
 
 
 def main() -> int:
     """Run the study; 1 where a bound is missed."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 60
-    begin, errors, held, kisses = time.process_time(), [], [], []
-    for number in range(count):
-        random = np.random.default_rng([40, number])
-        actuator = make_actuator(random)
-        found = identify_actuator([record(actuator, random)], USUAL)
-        error, covered = list_errors(found, actuator.model)
-        errors.append(error)
-        held.append(covered)
-        kisses.append(actuator.model.kiss_pressure)
-    cpu = (time.process_time() - begin) / count
-    table, names = np.array(errors), list(QUANTITIES)
-    late = int((np.abs(table[:, names.index("dead_time")]) <= _DEAD_TIME).sum())
-    kiss = np.abs(table[:, names.index("kiss_pressure")]) / np.array(kisses)
-    near = int((kiss <= _KISS).sum())
-    coverage = np.mean(held, axis=0)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", type=int, nargs="?", default=60, help="logs")
+    add_options(parser)
+    given = parser.parse_args()
+    begin, seeds = time.process_time(), range(given.count)
+    values = [one for number in seeds for one in study_actuator(number)]
+    cpu = (time.process_time() - begin) / given.count
+    finish_study("actuator", f"benchmarks.actuator {given.count}", seeds, {"values": values}, given)
+    errors = {name: [one for one in values if one["name"] == name] for name in QUANTITIES}
+    late = sum(abs(one["error"]) <= _DEAD_TIME for one in errors["dead_time"])
+    kiss = errors["kiss_pressure"]
+    near = sum(abs(one["error"]) <= _KISS * one["truth"] for one in kiss)
+    coverage = float(np.mean([abs(one["apart"]) <= Z95 for one in values]))
     sys.stdout.write(
-        f"dead time within 5 ms: {late} of {count}\nkiss pressure within 2 %: {near} of {count}\n"
+        f"dead time within 5 ms: {late} of {given.count}\n"
+        f"kiss pressure within 2 %: {near} of {given.count}\nCPU time per log: {cpu:.1f} s\n"
     )
-    for name, share in zip(names, coverage, strict=True):
-        sys.stdout.write(f"coverage of {QUANTITIES[name].label}: {100.0 * share:.0f} %\n")
-    sys.stdout.write(
-        f"coverage in all: {100.0 * coverage.mean():.1f} %\nCPU time per log: {cpu:.1f} s\n"
-    )
-    return 0 if min(late, near) >= _SHARE * count and coverage.mean() >= _SHARE else 1
+    return 0 if min(late, near) >= _SHARE * given.count and coverage >= _SHARE else 1
 
 
 if __name__ == "__main__":

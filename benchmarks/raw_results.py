@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Raw results of benchmarks in benchmarks/results, with what they were measured on and with.
 
-The pages on speed are built from these files: `python -m tools.results_page`.
+The pages on speed and accuracy are built from these files: `python -m tools.results_page`.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
+import re
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib import metadata
@@ -17,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.code_version import ROOT, read_commit
+from tools.result_blocks import accuracy
 
 RESULTS = ROOT / "benchmarks" / "results"
 DIGITS = 5
@@ -51,27 +55,76 @@ def write_results(
     packages
         Installed distributions whose versions matter.
     """
-    document = {
-        "origin": {
-            "commit": read_commit(),
-            "committed": _run("git", "log", "-1", "--format=%cI"),
-            "date": datetime.now(UTC).date().isoformat(),
-            "machine": _describe_machine(),
-            "compilers": {
-                "rustc": _run("rustc", "--version"),
-                "gcc": _run("gcc", "-dumpfullversion"),
-            },
-            "flags": {"core": f"{_CORE}{_read_rust_flags()}", **(flags or {})},
-            "versions": _list_versions(packages),
-            "clock": clock,
-            "rounds": rounds,
-            "seeds": list(seeds),
-        },
-        **measured,
+    origin = _describe_origin("", packages, flags or {})
+    times = {"clock": clock, "rounds": rounds, "seeds": list(seeds)}
+    return _write_document(name, {"origin": {**origin, **times}, **measured})
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a study whose outcomes docs/accuracy.md shows."""
+    parser.add_argument("--rows", type=Path, help="file of outcomes, which is continued")
+    parser.add_argument("--write", action="store_true", help="write benchmarks/results")
+    parser.add_argument("--commit", default="", help="commit that the outcomes of --rows are of")
+
+
+def finish_study(
+    study: str,
+    command: str,
+    seeds: Sequence[int],
+    tables: Mapping[str, Sequence[Mapping[str, Any]]],
+    given: argparse.Namespace,
+) -> None:
+    """Print the sections of a study on docs/accuracy.md, and write its raw results if asked to.
+
+    Parameters
+    ----------
+    study
+        Name of the study; its file is accuracy-STUDY.json.
+    command, seeds
+        Module with its arguments, and the seeds of the outcomes.
+    tables
+        Rows of equal keys by the name of the table.
+    given
+        Options of `add_options`.
+    """
+    origin = _describe_origin(given.commit, ("numpy", "scipy"), {})
+    source = {"command": f"python -m {command}", "seeds": list(seeds)}
+    columns = {
+        name: {"columns": list(rows[0]) if rows else [], "rows": [[*one.values()] for one in rows]}
+        for name, rows in tables.items()
     }
-    path = RESULTS / f"{name}.json"
+    document = _shorten({"origin": {**origin, **source}, **columns})
+    name = f"accuracy-{study}"
+    for section in accuracy.BLOCKS[name].values():
+        sys.stdout.write(f"{section(document)}\n")
+    if given.write:
+        _write_document(name, document)
+
+
+def _describe_origin(
+    commit: str, packages: Sequence[str], flags: Mapping[str, str]
+) -> dict[str, Any]:
+    """Describe code, machine, compilers and versions; `commit` is empty for the running one."""
+    return {
+        "commit": commit or read_commit(),
+        "committed": _run("git", "log", "-1", "--format=%cI", *([commit] if commit else [])),
+        "date": datetime.now(UTC).date().isoformat(),
+        "machine": _describe_machine(),
+        "compilers": {
+            "rustc": _run("rustc", "--version"),
+            "gcc": _run("gcc", "-dumpfullversion"),
+        },
+        "flags": {"core": f"{_CORE}{_read_rust_flags()}", **flags},
+        "versions": _list_versions(packages),
+    }
+
+
+def _write_document(name: str, document: Mapping[str, Any]) -> Path:
+    """Write a document, a list of plain values in one line."""
     text = json.dumps(_shorten(document), indent=1, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    text = re.sub(r"\[[^][{}]*\]", lambda found: re.sub(r"\n\s*", " ", found[0]), text)
+    path = RESULTS / f"{name}.json"
+    path.write_text(f"{text}\n", encoding="utf-8")
     return path
 
 

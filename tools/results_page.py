@@ -17,12 +17,13 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tools.result_blocks import pipeline, precision, speed
+from tools.result_blocks import accuracy, pipeline, precision, speed
 from tools.result_blocks.origin import Raw
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = "benchmarks/results"
-BLOCKS = {"speed": speed.BLOCKS, "pipeline": pipeline.BLOCKS, "precision": precision.BLOCKS}
+SPEED = {"speed": speed.BLOCKS, "pipeline": pipeline.BLOCKS, "precision": precision.BLOCKS}
+BLOCKS = {**SPEED, **accuracy.BLOCKS}
 """Sections by the name of their raw results."""
 PICTURES: dict[str, tuple[str, Callable[[Raw], str]]] = {
     f"docs/img/work-precision-{name}.svg": ("precision", draw)
@@ -31,7 +32,7 @@ PICTURES: dict[str, tuple[str, Callable[[Raw], str]]] = {
 """Pictures by path: the name of their raw results, and how they are drawn."""
 MOST_COMMITS = 200
 """Commits since the measurement from which on results are too old."""
-_SECTION = re.compile(r"(<!-- results (\w+): ([\w-]+) -->\n)(.*?)(<!-- end -->\n)", re.DOTALL)
+_SECTION = re.compile(r"(<!-- results ([\w-]+): ([\w-]+) -->\n)(.*?)(<!-- end -->\n)", re.DOTALL)
 
 
 def read_raw(name: str, root: Path = ROOT) -> Raw:
@@ -64,13 +65,14 @@ def fill_page(page: str, read: Callable[[str], Raw] = read_raw) -> str:
 
 def describe_age(root: Path = ROOT) -> list[str]:
     """Describe the raw results that are too old, and those that are not of one commit."""
-    origins = {name: read_raw(name, root)["origin"] for name in BLOCKS}
+    names = [path.stem for path in sorted((root / RESULTS).glob("*.json"))]
+    origins = {name: read_raw(name, root)["origin"] for name in names}
     words = []
     for name, origin in origins.items():
         since = _count_commits(origin["committed"], root)
         if since > MOST_COMMITS:
             words.append(f"{RESULTS}/{name}.json is {since} commits old: measure anew")
-    if len({origin["commit"] for origin in origins.values()}) > 1:
+    if len({origins[name]["commit"] for name in SPEED}) > 1:
         words.append(f"{RESULTS}: files of several commits: measure together, `make figures`")
     return words
 

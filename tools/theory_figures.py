@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Draw the figures of docs/theory.md and docs/accuracy.md.
+"""Draw the figures of docs/theory.md.
 
 `python -m tools.theory_figures` writes docs/img/theory-*.svg: the scheme of the dual-clutch
-driveline, the phases of a simulated shift, and the ellipse of one unknown and one effect. It writes
-docs/img/accuracy.svg from the tables of docs/accuracy.md.
+driveline, the phases of a simulated shift, and the ellipse of one unknown and one effect.
 """
 
 from __future__ import annotations
 
-import math
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -238,77 +234,10 @@ def draw_effect() -> str:
     return build_page(540, 300, parts, "One unknown and one effect")
 
 
-@dataclass(frozen=True)
-class Case:
-    """A section of docs/accuracy.md: (RMSE over bound, coverage [%]) of each row."""
-
-    title: str
-    commit: str
-    rows: Sequence[Point]
-
-
-def read_accuracy(page: str) -> list[Case]:
-    """Read the sections with a table of bounds."""
-    cases = []
-    for section in page.split("\n## ")[1:]:
-        is_study = "| RMSE/bound | coverage |" in section
-        found = re.findall(r"^\|.*\| (\S+) \| (\d+) % \|$", section, re.M) if is_study else []
-        commit = re.search(r"^Code of commit (\w{8})", section, re.M)
-        if found and commit:
-            rows = [(float(ratio), float(share)) for ratio, share in found]
-            cases.append(Case(section.partition("\n")[0], commit[1], rows))
-    return cases
-
-
-def draw_accuracy() -> str:
-    """Draw error over bound and coverage of every table row of docs/accuracy.md."""
-    cases = read_accuracy((FOLDER.parent / "accuracy.md").read_text(encoding="utf-8"))
-    step, top, width = 46.0, 40.0, 300.0
-    bottom = top + step * len(cases)
-
-    def place_ratio(value: float) -> float:
-        return 20 + width * math.log(value / 0.25) / math.log(3.0 / 0.25)
-
-    def place_share(value: float) -> float:
-        return 400 + width * (value - 90.0) / 10.0
-
-    edge = 2.0 * np.sqrt(475.0 / 200.0)
-    band = place_share(95.0 - edge), place_share(95.0 + edge)
-    size = f'y="{top - 14:g}" width="{band[1] - band[0]:.1f}" height="{bottom - top + 4:g}"'
-    parts = [f'<rect x="{band[0]:.1f}" {size} fill="{BAND}"/>']
-    for place, ticks, at in (
-        (place_ratio, (0.25, 0.5, 1.0, 2.0, 3.0), 1.0),
-        (place_share, (90.0, 92.0, 95.0, 98.0, 100.0), 95.0),
-    ):
-        parts.append(draw_path([(place(at), top - 14), (place(at), bottom - 10)], GREY))
-        parts += [draw_text((place(one), bottom + 8), f"{one:g}", size=11) for one in ticks]
-        parts += [
-            draw_path([(place(one), bottom - 10), (place(one), bottom - 6)], GREY) for one in ticks
-        ]
-    parts += [
-        draw_text((place_ratio(1.0), bottom + 26), "error (RMSE) over Cramér-Rao bound", size=12),
-        draw_text((place_share(95.0), bottom + 26), "coverage of 95 % intervals [%]", size=12),
-    ]
-    for row, case in enumerate(cases):
-        y = top + step * row
-        title = f"{case.title.replace('_', ' ')} ({case.commit})"
-        parts.append(draw_text((20, y - 4), title, anchor="start", size=12))
-        for ratio, share in case.rows:
-            parts.append(_draw_dot((place_ratio(ratio), y + 10), COLOURS[0]))
-            parts.append(_draw_dot((place_share(share), y + 10), COLOURS[0]))
-    return build_page(720, bottom + 40, parts, "Error over bound and coverage of the estimator")
-
-
-def _draw_dot(at: Point, colour: str) -> str:
-    centre = f'cx="{at[0]:.1f}" cy="{at[1]:.1f}"'
-    return f'<circle {centre} r="4.5" fill="{colour}" fill-opacity="0.45"/>'
-
-
 FIGURES: Mapping[str, Callable[[], str]] = {
     "theory-driveline.svg": draw_driveline,
     "theory-shift.svg": draw_shift,
     "theory-effect.svg": draw_effect,
-    "accuracy.svg": draw_accuracy,
 }
 """Figures by file name."""
 

@@ -2,18 +2,18 @@
 """Coverage of the intervals of bus logs: `python -m benchmarks.bus`.
 
 Makes and identifies COUNT drives from seed FIRST on, and prints the tables. With `--rows FILE` the
-drives are appended to a file, and those in it are not made again: several processes may share the
-work by seeds, and a last run with all files prints the tables.
+drives are appended to a file, and those in it are not made again.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from pathlib import Path
+from dataclasses import asdict
 
-from benchmarks.bus.study import Row, format_tables, study_drive, to_record
+from benchmarks.bus.study import Row, list_tables, study_drive
+from benchmarks.raw_results import add_options, finish_study
+from benchmarks.rows import append_row, read_rows
 
 
 def main() -> int:
@@ -21,23 +21,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("first", type=int, nargs="?", default=0, help="first seed")
     parser.add_argument("count", type=int, nargs="?", default=40, help="drives")
-    parser.add_argument("--rows", type=Path, action="append", default=[], help="files of drives")
-    options = parser.parse_args()
-    drives = {}
-    for file in options.rows:
-        for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
-            rows = [Row(**one) for one in json.loads(line)["rows"]]
-            drives[rows[0].seed] = rows
-    for seed in range(options.first, options.first + options.count):
+    add_options(parser)
+    given = parser.parse_args()
+    known = ([Row(**row) for row in one["rows"]] for one in read_rows(given.rows))
+    drives = {rows[0].seed: rows for rows in known}
+    wanted = range(given.first, given.first + given.count)
+    for seed in wanted:
         if seed in drives:
             continue
-        rows, seconds = study_drive(seed)
-        drives[seed] = rows
-        if options.rows:
-            with options.rows[0].open("a", encoding="utf-8") as file:
-                file.write(json.dumps(to_record(rows, seconds)) + "\n")
-    wanted = range(options.first, options.first + options.count)
-    sys.stdout.write(format_tables([drives[seed] for seed in wanted]))
+        drives[seed], seconds = study_drive(seed)
+        rows = [asdict(one) for one in drives[seed]]
+        append_row(given.rows, {"seconds": seconds, "rows": rows})
+    command = f"benchmarks.bus {given.first} {given.count}"
+    finish_study("bus", command, wanted, list_tables([drives[seed] for seed in wanted]), given)
     return 0
 
 

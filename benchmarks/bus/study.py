@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -50,11 +50,6 @@ class Row:
     verdict: str
     peer: float | None = None
     peer_half: float | None = None
-
-    @property
-    def is_inside(self) -> bool:
-        """True where the interval contains the truth."""
-        return self.value is not None and abs(self.value - self.truth) <= (self.half or 0.0)
 
 
 def list_truth(vehicle: Vehicle) -> dict[str, float]:
@@ -148,53 +143,36 @@ def fit_single(record: DecayRecord) -> tuple[float, float] | None:
     return (omega / (2.0 * np.pi), damping) if 0.0 < damping < 0.5 else None
 
 
-def to_record(rows: Sequence[Row], seconds: float) -> dict[str, Any]:
-    """Rows of one drive as plain values."""
-    return {"seconds": seconds, "rows": [asdict(one) for one in rows]}
+def list_tables(drives: Sequence[Sequence[Row]]) -> dict[str, list[dict[str, Any]]]:
+    """List the raw results: one row for each drive, and one for each of its values."""
+    logs = []
+    for drive in drives:
+        known = sum(one.verdict == Verdict.IDENTIFIED for one in drive)
+        logs.append(
+            {"seed": drive[0].seed, "kind": "drive", "status": f"{known} values identified"}
+        )
+    return {
+        "logs": logs,
+        "values": [_describe(one) for drive in drives for one in drive if one.half],
+    }
 
 
-def format_tables(drives: Sequence[Sequence[Row]]) -> str:
-    """Coverage by quantity, and the ring-down by SciPy beside."""
-    lines = [
-        f"{len(drives)} drives.",
-        "",
-        "| quantity | values | inside 95 % | drives with all inside | identified | median ± % |",
-        "|---|---|---|---|---|---|",
-    ]
-    every = [one for drive in drives for one in drive if one.value is not None]
-    for stem, name in QUANTITIES.items():
-        values = [one for one in every if one.quantity == stem]
-        if not values:
-            continue
-        drive_count = len({one.seed for one in values})
-        failed = {one.seed for one in values if not one.is_inside}
-        known = sum(one.verdict == Verdict.IDENTIFIED for one in values)
-        width = np.median([100.0 * (one.half or np.nan) / abs(one.truth) for one in values])
-        share = np.mean([one.is_inside for one in values])
-        lines.append(
-            f"| {name} | {len(values)} | {100.0 * share:.1f} % | "
-            f"{drive_count - len(failed)} of {drive_count} | {known} | {width:.2g} |"
-        )
-    pooled = np.mean([one.is_inside for one in every])
-    many = np.mean(
-        [sum(one.verdict == Verdict.IDENTIFIED for one in drive) >= 6 for drive in drives]
-    )
-    lines += [
-        "",
-        f"Pooled: {100.0 * pooled:.1f} % of {len(every)} values inside. Drives with six identified "
-        f"quantities or more: {100.0 * many:.0f} %.",
-        "",
-        "| | rms error, % | inside 95 % | SciPy: rms error, % | inside 95 % |",
-        "|---|---|---|---|---|",
-    ]
-    for stem in ("f_d", "zeta"):
-        both = [one for one in every if one.quantity == stem and one.peer is not None]
-        own = [(one.value or 0.0) / one.truth - 1.0 for one in both]
-        peer = [(one.peer or 0.0) / one.truth - 1.0 for one in both]
-        inside = [abs((one.peer or 0.0) - one.truth) <= (one.peer_half or 0.0) for one in both]
-        lines.append(
-            f"| {QUANTITIES[stem]} | {100.0 * np.sqrt(np.mean(np.square(own))):.2g} | "
-            f"{100.0 * np.mean([one.is_inside for one in both]):.0f} % | "
-            f"{100.0 * np.sqrt(np.mean(np.square(peer))):.2g} | {100.0 * np.mean(inside):.0f} % |"
-        )
-    return "\n".join(lines) + "\n"
+def _describe(one: Row) -> dict[str, Any]:
+    assert one.value is not None
+    assert one.half is not None
+    error, width = one.value / one.truth - 1.0, one.half / abs(one.truth)
+    peer_error = None if one.peer is None else one.peer / one.truth - 1.0
+    peer_apart = None
+    if peer_error is not None and one.peer_half:
+        peer_apart = 1.96 * peer_error * abs(one.truth) / one.peer_half
+    return {
+        "seed": one.seed,
+        "kind": QUANTITIES[one.quantity],
+        "name": one.id,
+        "sort": one.verdict,
+        "apart": 1.96 * error / width,
+        "error": error,
+        "width": width,
+        "peer_error": peer_error,
+        "peer_apart": peer_apart,
+    }

@@ -22,13 +22,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from benchmarks.calibrate.true_units import draw_true_units
 from benchmarks.calibrate.true_vehicle import MadeVehicle, make_vehicle
+from benchmarks.raw_results import add_options, finish_study
+from benchmarks.rows import append_row, read_rows
 from drivetwin._util.arrays import FloatArray
 from drivetwin.calibration.calibrate import Calibration, calibrate
 from drivetwin.calibration.metrics import Metric
@@ -38,25 +40,32 @@ from drivetwin.calibration.policy import Space
 from drivetwin.calibration.spread import OilFriction, OilState, Spread
 from drivetwin.calibration.twin_task import build_task
 from drivetwin.errors import DrivetwinError
+from tools.result_blocks.accuracy import HELD, LEAST
 
-_COUNT, _HELD, _REFUSED = 24, 20, 4
-_SHARE, _LEAST, _ABOVE = 0.93, 0.85, 1.25
+_COUNT, _HELD, _REFUSED, _ABOVE = 24, 20, 4, 1.25
 _LOG, _HEAT, _FRICTION = 350.0, 40.0, OilFriction(-0.08 / 40.0, 0.3 * 0.08 / 40.0)
 """Oil of the log [K], hot oil over it [K], and a friction that falls by 8 % in between."""
 
 
 @dataclass(frozen=True)
 class Promise:
-    """Promised peak jerk of a vehicle [m/s^3], share of its units below it, and true 95 % value."""
+    """Promised peak jerk of a vehicle [m/s^3], share of its units below it, and true 95 % value.
 
-    promised: float
-    share: float
-    true: float
+    `detail` are the effects of the vehicle with their sizes, `failure` the message of a refused
+    twin, `usual` the true 95 % value of a calibration for the oil of the log.
+    """
+
+    seed: int
+    promised: float = 0.0
+    share: float = 0.0
+    true: float = 0.0
+    usual: float = 0.0
+    detail: str = ""
+    failure: str = ""
 
 
 def try_vehicle(seed: int, whole: bool, given: argparse.Namespace) -> Promise:
-    """Identify, calibrate and try one vehicle; print a line."""
-    begin = time.process_time()
+    """Identify, calibrate and try one vehicle."""
     made = make_vehicle(seed, whole=whole, parts=True)
     found, jerk = _calibrate(made, given, OilState())
     usual = float(np.quantile(jerk, 0.95))
@@ -64,18 +73,9 @@ def try_vehicle(seed: int, whole: bool, given: argparse.Namespace) -> Promise:
         found, jerk = _calibrate(made, given, OilState(_HEAT, _FRICTION), found)
     promised = found.after.certificate.quantiles[Metric.PEAK_JERK].promised
     assert promised is not None
-    result = Promise(promised, float(np.mean(jerk <= promised)), float(np.quantile(jerk, 0.95)))
-    if given.hot:
-        sys.stdout.write(f"with the oil of the log {usual:.1f} m/s3, {result.true / usual:.3f}: ")
-    effects = ", ".join(f"{name} {size:.3g}" for name, size in made.effects.items()) or "none"
-    pooled = found.after.certificate.quantiles[Metric.PEAK_JERK].share_95
-    sys.stdout.write(
-        f"vehicle {seed} ({effects}): promised {promised:.1f} (of all draws {pooled:.1f}), true "
-        f"{result.true:.1f} m/s3, {100.0 * result.share:.1f} % below; "
-        f"{time.process_time() - begin:.0f} s of CPU\n"
-    )
-    sys.stdout.flush()
-    return result
+    share, true = float(np.mean(jerk <= promised)), float(np.quantile(jerk, 0.95))
+    detail = ", ".join(f"{name} {size:.3g}" for name, size in made.effects.items())
+    return Promise(seed, promised, share, true, usual, detail)
 
 
 def _calibrate(
@@ -115,26 +115,33 @@ def main() -> int:
     parser.add_argument("--effort", type=float, default=0.4, help="length of the search")
     parser.add_argument("--units", type=int, default=1000, help="made units of a vehicle")
     parser.add_argument("--hot", action="store_true", help="with hot oil")
+    add_options(parser)
     given = parser.parse_args()
-    found: list[Promise] = []
-    refused, seed = 0, given.first
-    while len(found) < given.count and refused <= given.count:
+    every = [Promise(**one) for one in read_rows(given.rows)]
+    while _count(every) < given.count and len(every) <= 2 * given.count:
+        seed = given.first + len(every)
         try:
-            found.append(try_vehicle(seed, len(found) % 2 == 1, given))
+            one = try_vehicle(seed, _count(every) % 2 == 1, given)
         except DrivetwinError as error:
-            refused += 1
-            sys.stdout.write(f"vehicle {seed}: {error.what}\n")
-        seed += 1
+            one = Promise(seed, failure=error.what)
+        every.append(one)
+        append_row(given.rows, asdict(one))
+        sys.stdout.write(f"{one}\n")
+        sys.stdout.flush()
+    command = f"benchmarks.calibrate.promise {given.count} --first {given.first}"
+    command += f" --effort {given.effort:g} --units {given.units}{' --hot' * given.hot}"
+    rows = [asdict(one) for one in every]
+    finish_study("promise", command, [one.seed for one in every], {"logs": rows}, given)
+    found = [one for one in every if not one.failure]
     shares = np.array([one.share for one in found])
     above = float(np.median([one.promised / one.true for one in found]))
-    held, low = int(np.sum(shares >= _SHARE)), int(np.sum(shares < _LEAST))
-    sys.stdout.write(
-        f"{held} of {len(found)} vehicles with at least {100 * _SHARE:.0f} % of the units below "
-        f"the promise, {low} with less than {100 * _LEAST:.0f} %; promise over true 95 % value, "
-        f"median: {above:.3f}; {refused} twins refused\n"
-    )
+    held, low = int(np.sum(shares >= HELD)), int(np.sum(shares < LEAST))
     held_all = held >= _HELD and low <= 1
-    return 0 if held_all and above <= _ABOVE and refused <= _REFUSED else 1
+    return 0 if held_all and above <= _ABOVE and len(every) - len(found) <= _REFUSED else 1
+
+
+def _count(every: Sequence[Promise]) -> int:
+    return sum(not one.failure for one in every)
 
 
 if __name__ == "__main__":

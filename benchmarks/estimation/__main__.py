@@ -1,83 +1,64 @@
 # SPDX-License-Identifier: MIT
-"""Accuracy studies, each with a section of docs/accuracy.md: `python -m benchmarks.estimation`."""
+"""Errors of the likelihood method over the Cramér-Rao bound: `python -m benchmarks.estimation`.
+
+Fits noise realisations of scenarios of the virtual dynamometer. Design values that the card has
+roughly are drawn about the truth. The bound is the Fisher information at the truth with the noise
+of outputs and inputs and the priors of the card.
+"""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
+from typing import Any
 
-from benchmarks.code_version import read_commit
-from benchmarks.estimation.mismatch import FAULTS, measure_shift
-from benchmarks.estimation.report import (
-    format_faults,
-    format_starts,
-    format_study,
-    format_unseen,
-    update_page,
-)
-from benchmarks.estimation.starts import count_outcomes
-from benchmarks.estimation.study import run_study
-from benchmarks.estimation.unseen import identify_unseen
-from drivetwin._util.atomic import write_text
+from benchmarks.estimation.study import compute_bounds, fit_seed, list_bounds, list_values
+from benchmarks.raw_results import add_options, finish_study
+from benchmarks.rows import append_row, read_rows
 from drivetwin.dyno import ScenarioName
 from drivetwin.dyno.scenario_file import load_scenario
 from tests.support.bench import Knowledge
 
-PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
-COUNT, TRIES, FAULTY, VEHICLES = 200, 200, 20, 100
-"""Realisations of a case, tries of bad starts, realisations of a fault (a shift of the mean needs
-few), vehicles drawn at random."""
 ROUGH = Knowledge(J_out=0.1, P0=5e3)
-CASES = (
-    (ScenarioName.THROTTLE_STEPS, Knowledge(), "Jo′ and P0 known"),
-    (ScenarioName.THROTTLE_STEPS, ROUGH, "Jo′ ± 10 %, P0 ± 0.05 bar"),
-    (ScenarioName.PAPER_STEPS, ROUGH, "Jo′ ± 10 %, P0 ± 0.05 bar"),
-    (ScenarioName.PAPER, Knowledge(), "constant engine torque, Jo′ and P0 known"),
-    (
-        ScenarioName.GEARBOX,
-        Knowledge(J_out=0.1, P0=5e3, drum=0.03),
-        "the whole gearbox; Jo′ ± 10 %, P0 ± 0.05 bar, drums ± 0.03 kg m²",
-    ),
-)
-
-
+CASES = {
+    "throttle steps": (ScenarioName.THROTTLE_STEPS, Knowledge()),
+    "throttle steps, rough card": (ScenarioName.THROTTLE_STEPS, ROUGH),
+    "paper steps, rough card": (ScenarioName.PAPER_STEPS, ROUGH),
+    "constant torque": (ScenarioName.PAPER, Knowledge()),
+    "gearbox, rough card": (ScenarioName.GEARBOX, Knowledge(J_out=0.1, P0=5e3, drum=0.03)),
+}
+"""Scenarios with the knowledge of the card. A rough card has Jo′ ± 10 %, P0 ± 0.05 bar and drums
+± 0.03 kg m²."""
 APART = 10_000
 """Seeds of one case begin so far behind those of the case before."""
-STARTS, FAULTS_TOO, UNSEEN = "starts", "faults", "vehicles"
-PARTS = (*(str(place) for place in range(1, len(CASES) + 1)), STARTS, UNSEEN, FAULTS_TOO)
 
 
 def main() -> int:
-    """Run all that is asked for; each section of the page appears when it is done."""
+    """Fit the realisations that the file of outcomes lacks."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("count", type=int, nargs="?", default=COUNT, help="realisations of a case")
-    parser.add_argument("--tries", type=int, default=TRIES, help="fits from bad start values")
-    parser.add_argument("--faulty", type=int, default=FAULTY, help="realisations of a fault")
-    parser.add_argument("--vehicles", type=int, default=VEHICLES, help="drawn at random")
-    parser.add_argument(
-        "--only", nargs="+", choices=PARTS, default=PARTS, help="cases by number, other sections"
-    )
-    asked = parser.parse_args()
-    for place, (name, know, text) in enumerate(CASES):
-        if str(place + 1) in asked.only:
-            seeds = range(place * APART, place * APART + asked.count)
-            _write(format_study(run_study(load_scenario(name), know, seeds), text))
-    if STARTS in asked.only:
-        _write(format_starts(count_outcomes(asked.tries)))
-    if UNSEEN in asked.only:
-        _write(format_unseen(identify_unseen(range(asked.vehicles))))
-    if FAULTS_TOO in asked.only:
-        shifts = [measure_shift(fault, asked.faulty) for fault in FAULTS]
-        _write(format_faults(shifts, asked.faulty))
+    parser.add_argument("count", type=int, nargs="?", default=200, help="realisations of a case")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    add_options(parser)
+    given = parser.parse_args()
+    done = {(one["kind"], one["seed"]): one for one in read_rows(given.rows)}
+    tables: dict[str, list[dict[str, Any]]] = {"logs": [], "values": [], "bounds": []}
+    seeds = []
+    for place, (kind, (name, know)) in enumerate(CASES.items()):
+        scenario, first = load_scenario(name), given.first + place * APART
+        bounds = compute_bounds(scenario, know)
+        tables["bounds"] += list_bounds(kind, scenario, know, bounds)
+        for seed in range(first, first + given.count):
+            if (kind, seed) not in done:
+                done[kind, seed] = {"kind": kind, **fit_seed(scenario, know, seed)}
+                append_row(given.rows, done[kind, seed])
+            one = done[kind, seed]
+            log = {key: value for key, value in one.items() if key != "errors"}
+            tables["logs"].append({**log, "right": not one["failure"]})
+            tables["values"] += list_values(one, bounds)
+            seeds.append(seed)
+    command = f"benchmarks.estimation {given.count} --first {given.first}"
+    finish_study("cases", command, seeds, tables, given)
     return 0
-
-
-def _write(section: str) -> None:
-    """Write a section into the page, with the commit of the code."""
-    before = PAGE.read_text(encoding="utf-8")
-    write_text(PAGE, update_page(before, f"{section}\nCode of commit {read_commit()}.\n"))
-    print(f"{section.partition(chr(10))[0]}: written", flush=True)
 
 
 if __name__ == "__main__":

@@ -4,19 +4,19 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, read_back, record_vehicle
 from benchmarks.estimation.rough_card import write_card
-from benchmarks.estimation.rough_count import RoughLog, summarise
+from benchmarks.estimation.rough_log import RoughLog
 from benchmarks.estimation.unlisted import UNLISTED, UnlistedId, add_unlisted
 from benchmarks.estimation.validity import (
     correct_delay,
@@ -25,6 +25,8 @@ from benchmarks.estimation.validity import (
     judge_values,
     withhold,
 )
+from benchmarks.raw_results import add_options, finish_study
+from benchmarks.rows import append_row, read_rows
 from drivetwin.dyno.dyno import DynoRun
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
@@ -183,42 +185,47 @@ def judge_friction(found: Identification, made: MismatchLog) -> dict[str, float]
     return errors
 
 
-def read_results(path: Path) -> dict[int, RoughLog]:
-    """Read the results of an output file by seed; a line that was cut off is left out."""
-    found = {}
-    if path.exists():
-        for line in path.read_text(encoding="utf-8").splitlines():
-            try:
-                one = RoughLog(**json.loads(line))
-            except json.JSONDecodeError:
-                continue
-            found[one.seed] = one
-    return found
-
-
-def run_study(seeds: Iterable[int], output: Path, workers: int | None) -> list[RoughLog]:
-    """Study the vehicles of `seeds` that the output file lacks, and append each result to it."""
+def run_study(seeds: Iterable[int], rows: Path | None, workers: int | None) -> list[RoughLog]:
+    """Study the vehicles of `seeds` that the file of outcomes lacks, and append each result."""
     wanted = list(seeds)
-    done: Mapping[int, RoughLog] = read_results(output)
-    open_seeds = [seed for seed in wanted if seed not in done]
-    text = output.read_text(encoding="utf-8") if output.exists() else ""
-    with output.open("a", encoding="utf-8") as file, ProcessPoolExecutor(workers) as pool:
-        file.write("\n" if text and not text.endswith("\n") else "")
-        jobs = {pool.submit(study_vehicle, seed): seed for seed in open_seeds}
+    done = {one["seed"]: RoughLog(**one) for one in read_rows(rows)}
+    with ProcessPoolExecutor(workers) as pool:
+        jobs = {pool.submit(study_vehicle, seed): seed for seed in wanted if seed not in done}
         for job in as_completed(jobs):
             error = job.exception()
             one = job.result() if error is None else _record_crash(jobs[job], error)
-            file.write(json.dumps(asdict(one)) + "\n")
-            file.flush()
+            done[one.seed] = one
+            append_row(rows, asdict(one))
             print(_format_log(one), file=sys.stderr, flush=True)
-    found = read_results(output)
-    return [found[seed] for seed in wanted]
+    return [done[seed] for seed in wanted]
 
 
 def _record_crash(seed: int, error: BaseException) -> RoughLog:
     """Record an error that the package should have turned into one of its own."""
     plan, text = plan_vehicle(seed), f"crash: {error!r}"
     return RoughLog(seed, plan.group, plan.mismatch, 0.0, "crash", STANDARD_VALUES, failure=text)
+
+
+def list_tables(logs: Sequence[RoughLog]) -> dict[str, list[dict[str, Any]]]:
+    """List the raw results of logs: one row for each log, and one for each of its values."""
+    rows = [
+        {
+            "seed": one.seed,
+            "kind": one.group,
+            "detail": one.mismatch,
+            "status": one.status,
+            "possible": one.possible,
+            "failure": one.failure,
+        }
+        for one in logs
+    ]
+    values = [
+        {"seed": one.seed, "kind": one.group, "name": name, "sort": sort, "apart": apart}
+        for one in logs
+        for sort, found in one.sorts.items()
+        for name, apart in found.items()
+    ]
+    return {"logs": rows, "values": values}
 
 
 def _format_log(one: RoughLog) -> str:
@@ -236,14 +243,12 @@ def main() -> None:
     parser.add_argument("--logs", type=int, default=200, help="made vehicles")
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--workers", type=int, help="processes; default one for each core")
-    parser.add_argument(
-        "-o", "--output", type=Path, default=Path("out/rough.jsonl"),
-        help="file of results, one line for each log; its seeds are not run again",
-    )  # fmt: skip
+    add_options(parser)
     given = parser.parse_args()
-    given.output.parent.mkdir(parents=True, exist_ok=True)
     seeds = range(given.first, given.first + given.logs)
-    print("\n".join(summarise(run_study(seeds, given.output, given.workers))))
+    logs = run_study(seeds, given.rows, given.workers)
+    command = f"benchmarks.estimation.rough --logs {given.logs} --first {given.first}"
+    finish_study("rough", command, seeds, list_tables(logs), given)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Monte Carlo of one scenario: errors, stated deviations and the bound."""
+"""One scenario of the dynamometer: errors and standard deviations of fits, and their bound."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -35,51 +35,63 @@ SLIPS = {f"mu at {slip:g} rad/s": slip for slip in (10.0, 30.0, 50.0)}
 """Slips [rad/s] at which the friction coefficient is compared, by the name in the tables."""
 
 
-@dataclass(frozen=True)
-class Sample:
-    """Error and stated standard deviation of one parameter in one realisation."""
-
-    error: float
-    std: float
-
-
-@dataclass(frozen=True)
-class Study:
-    """`samples` of `count` realisations, truth and bound by parameter; number of failed fits."""
-
-    name: str
-    count: int
-    truth: Mapping[str, float]
-    bounds: Mapping[str, float]
-    samples: Mapping[str, list[Sample]]
-    failures: int
-
-
-def run_study(scenario: Scenario, know: Knowledge, seeds: Sequence[int]) -> Study:
-    """Fit the noise realisations of `seeds` by the likelihood method."""
-    truth = build_truth(record_bench(scenario, 0, know, noise=0.0))
-    samples: dict[str, list[Sample]] = {}
-    failures = 0
-    with ProcessPoolExecutor() as pool:
-        for found in pool.map(partial(_fit_one, scenario, know), seeds):
-            failures += not found
-            _collect(samples, truth, found)
-    return Study(
-        scenario.name, len(seeds), truth, compute_bounds(scenario, know), samples, failures
-    )
-
-
 Estimates = dict[str, tuple[float, float]]
 """Value and standard deviation by parameter."""
 
 
-def _fit_one(scenario: Scenario, know: Knowledge, seed: int) -> Estimates:
-    """Fit one realisation; empty if that fails."""
+def fit_seed(scenario: Scenario, know: Knowledge, seed: int) -> dict[str, Any]:
+    """Fit a noise realisation; return errors and standard deviations by parameter, and CPU time."""
     bench = record_bench(scenario, seed, know)
+    truth = build_truth(record_bench(scenario, 0, know, noise=0.0))
+    begin, failure = time.process_time(), ""
+    found: Estimates = {}
     try:
-        return read_fit(fit_likelihood(bench), bench)
-    except IdentificationError:
-        return {}
+        found = read_fit(fit_likelihood(bench), bench)
+    except IdentificationError as error:
+        failure = error.what
+    return {
+        "seed": seed,
+        "seconds": time.process_time() - begin,
+        "failure": failure,
+        "errors": {
+            name: (value - truth[name], std)
+            for name, (value, std) in found.items()
+            if name in truth and std > 0.0
+        },
+    }
+
+
+def list_values(outcome: Mapping[str, Any], bounds: Mapping[str, float]) -> list[dict[str, Any]]:
+    """List one row for each value of an outcome that has a bound."""
+    return [
+        {
+            "seed": outcome["seed"],
+            "kind": outcome["kind"],
+            "name": name,
+            "sort": "estimate",
+            "apart": error / std,
+            "ratio": error / bounds[name],
+        }
+        for name, (error, std) in outcome["errors"].items()
+        if bounds.get(name, 0.0) > 0.0
+    ]
+
+
+def list_bounds(
+    kind: str, scenario: Scenario, know: Knowledge, bounds: Mapping[str, float]
+) -> list[dict[str, Any]]:
+    """List the bounds of a case, in percent of the truth; that of the delay in ms."""
+    truth = build_truth(record_bench(scenario, 0, know, noise=0.0))
+    return [
+        {
+            "kind": kind,
+            "name": name,
+            "bound": 1e3 * std if name == "te_delay" else 100.0 * std / truth[name],
+            "unit": "ms" if name == "te_delay" else "%",
+        }
+        for name, std in bounds.items()
+        if std > 0.0 and name in truth
+    ]
 
 
 def compute_guess(bench: Bench) -> dict[str, float]:
@@ -195,13 +207,3 @@ def propagate(
     if "te_delay" not in point.names:
         found.pop("te_delay", None)
     return found
-
-
-def _collect(
-    into: dict[str, list[Sample]],
-    truth: Mapping[str, float],
-    found: Mapping[str, tuple[float, float]],
-) -> None:
-    for name, (value, std) in found.items():
-        if name in truth and std > 0.0:
-            into.setdefault(name, []).append(Sample(value - truth[name], std))

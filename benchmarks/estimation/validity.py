@@ -4,19 +4,21 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch_log
-from benchmarks.estimation.rough_count import FAR, compute_kept
 from benchmarks.estimation.vehicles import draw_vehicle
+from benchmarks.raw_results import add_options, finish_study
+from benchmarks.rows import append_row, read_rows
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.identification import Identification
@@ -32,6 +34,7 @@ from drivetwin.twin.build import build_twin
 from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.effects import EffectId, EffectPrior
+from tools.result_blocks.accuracy import TWO
 
 MODE_HZ = (28.0, 110.0)
 """Range of the frequency of an input-shaft mode [Hz]."""
@@ -71,6 +74,11 @@ class StudyLog:
     own_evidence: float | None = None
     chi2: float | None = None
     status: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Effect of the vehicle."""
+        return TWO if "+" in self.effect else self.effect or "none"
 
 
 @dataclass(frozen=True)
@@ -262,33 +270,19 @@ def judge_values(
     return values
 
 
-def run_study(
-    seeds: Iterable[int],
-    effects: Sequence[EffectId | None],
-    factor: float,
-    *,
-    withheld: bool = False,
-    processes: int | None = None,
+def run_jobs(
+    jobs: Mapping[int, Callable[[], StudyLog]], rows: Path | None, processes: int | None
 ) -> list[StudyLog]:
-    """Study one log for each seed; the effects take turns. Print each log as it is done."""
-    study = partial(study_log, factor=factor, withheld=withheld)
+    """Run the jobs whose seeds the file of outcomes lacks; print each log as it is done."""
+    done = {one["seed"]: StudyLog(**one) for one in read_rows(rows)}
     with ProcessPoolExecutor(processes) as pool:
-        jobs = [pool.submit(study, one, effects[k % len(effects)]) for k, one in enumerate(seeds)]
-        return _collect(jobs)
-
-
-def run_pairs(seeds: Iterable[int], processes: int | None = None) -> list[StudyLog]:
-    """Study one log with two effects for each seed. Print each log as it is done."""
-    with ProcessPoolExecutor(processes) as pool:
-        return _collect([pool.submit(study_pair, one) for one in seeds])
-
-
-def _collect(jobs: Sequence[Future[StudyLog]]) -> list[StudyLog]:
-    logs = []
-    for job in jobs:
-        logs.append(job.result())
-        print(_format_log(logs[-1]), file=sys.stderr, flush=True)
-    return logs
+        running = [pool.submit(job) for seed, job in jobs.items() if seed not in done]
+        for one in as_completed(running):
+            log = one.result()
+            done[log.seed] = log
+            append_row(rows, asdict(log))
+            print(_format_log(log), file=sys.stderr, flush=True)
+    return [done[seed] for seed in jobs]
 
 
 def _format_log(one: StudyLog) -> str:
@@ -308,54 +302,34 @@ def _format_log(one: StudyLog) -> str:
     return f"{head} {cause} {moved} {chi2} {one.failure[:60]}"
 
 
-def summarise(logs: Sequence[StudyLog]) -> list[str]:
-    """Summarise the coverage by effect, of all departing and of all other logs, and the naming."""
-    groups = {
-        name: [one for one in logs if one.effect == name]
-        for name in dict.fromkeys(one.effect for one in logs)
+def list_tables(logs: Sequence[StudyLog]) -> dict[str, list[dict[str, Any]]]:
+    """List the raw results of logs: one row for each log, and one for each of its values."""
+    return {
+        "logs": [_describe_log(one) for one in logs],
+        "values": [
+            {"seed": one.seed, "kind": one.kind, "name": name, "sort": sort, "apart": apart}
+            for one in logs
+            for sort, values in (("identified", one.identified), ("weak", one.weak))
+            for name, apart in values.items()
+        ],
     }
-    lines = [_format_row(name or "none", group) for name, group in groups.items()]
-    departing = [one for one in logs if one.effect]
-    lines.append(_format_row("all departing", departing))
-    evident = [one for one in departing if one.evidence > LEAD]
-    right = sum(one.effect in one.named for one in evident)
-    obeying = groups.get("", [])
-    false = sum(one.evidence > LEAD for one in obeying)
-    lines.append(f"right cause {right} of {len(evident)}, false alarms {false} of {len(obeying)}")
-    moved = [one for one in departing if one.moved is not None and one.moved > MOVED]
-    visible = [one for one in moved if (one.own_evidence or 0.0) > VISIBLE]
-    for group, text in ((moved, ""), (visible, f" and have over {VISIBLE:.1f} nats alone")):
-        right = sum(one.effect in one.named for one in group)
-        lines.append(
-            f"right cause of effects that move a value by over {MOVED:g}{text}: "
-            f"{right} of {len(group)}"
-        )
-    certain = sum(one.certain and one.chi2 is not None and one.chi2 > CERTAIN_CHI2 for one in logs)
-    lines.append(f"causes called certain at chi2 above {CERTAIN_CHI2:g}: {certain}")
-    lines += [
-        f"kept of {name} {_format_kept(group)}"
-        for name, group in (("departing", departing), ("obeying", obeying))
-        if group
-    ]
-    return lines
 
 
-def _format_kept(logs: Sequence[StudyLog]) -> str:
-    return str(compute_kept([len(one.identified) for one in logs], [one.possible for one in logs]))
-
-
-def _format_row(name: str, logs: Sequence[StudyLog]) -> str:
-    identified = [z for one in logs for z in one.identified.values()]
-    weak = [z for one in logs for z in one.weak.values()]
-    inside = sum(abs(z) < Z95 for z in identified)
-    far = sum(abs(z) > FAR for z in identified)
-    share = 100.0 * inside / max(len(identified), 1)
-    failed = sum(bool(one.failure) for one in logs)
-    return (
-        f"{name:22s} {len(logs):3d} logs ({failed} failed), identified {inside:4d} of "
-        f"{len(identified):4d} inside ({share:.0f} %), {far} far; weak "
-        f"{sum(abs(z) < Z95 for z in weak)} of {len(weak)}"
-    )
+def _describe_log(one: StudyLog) -> dict[str, Any]:
+    moved = one.moved is not None and one.moved > MOVED
+    return {
+        "seed": one.seed,
+        "kind": one.kind,
+        "detail": f"{one.effect} {one.size:.3g}" if one.effect else "",
+        "status": one.status or "no result",
+        "possible": one.possible,
+        "failure": one.failure,
+        "evident": one.evidence > LEAD,
+        "right": one.effect in one.named,
+        "moved": moved,
+        "visible": moved and (one.own_evidence or 0.0) > VISIBLE,
+        "overconfident": one.certain and one.chi2 is not None and one.chi2 > CERTAIN_CHI2,
+    }
 
 
 def main() -> None:
@@ -368,23 +342,27 @@ def main() -> None:
     parser.add_argument("--factor", type=float, default=1.0, help="factor of all sizes")
     parser.add_argument("--withheld", action="store_true", help="switch each true effect off")
     parser.add_argument("--processes", type=int, help="processes; default one for each core")
-    parser.add_argument("-o", "--output", type=Path, help="write the results as JSON")
+    add_options(parser)
     given = parser.parse_args()
-    seeds = range(given.first, given.first + given.logs)
-    study = partial(
-        run_study, factor=given.factor, withheld=given.withheld, processes=given.processes
-    )
-    logs = study(seeds, list(EFFECTS))
-    seeds = range(given.first + given.logs, given.first + given.logs + given.obeying)
-    logs += study(seeds, [None])
-    pairs = run_pairs(range(seeds.stop, seeds.stop + given.pairs), given.processes)
-    print("\n".join(summarise(logs) if logs else []))
-    if pairs:
-        print(_format_row("pairs", pairs))
-        print(f"kept of pairs {_format_kept(pairs)}")
-    logs += pairs
-    if given.output:
-        given.output.write_text(json.dumps([asdict(one) for one in logs]), encoding="utf-8")
+    study = partial(study_log, factor=given.factor, withheld=given.withheld)
+    departing = range(given.first, given.first + given.logs)
+    obeying = range(departing.stop, departing.stop + given.obeying)
+    pairs = range(obeying.stop, obeying.stop + given.pairs)
+    jobs = {
+        **{
+            seed: partial(study, seed, effect)
+            for seed, effect in zip(departing, cycle(EFFECTS), strict=False)
+        },
+        **{seed: partial(study, seed, None) for seed in obeying},
+        **{seed: partial(study_pair, seed) for seed in pairs},
+    }
+    logs = run_jobs(jobs, given.rows, given.processes)
+    command = "benchmarks.estimation.validity"
+    command += f" --logs {given.logs} --obeying {given.obeying} --pairs {given.pairs}"
+    command += f" --first {given.first}"
+    command += " --withheld" * given.withheld
+    command += f" --factor {given.factor:g}" * (given.factor != 1.0)
+    finish_study("validity", command, [*jobs], list_tables(logs), given)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 
 from benchmarks.estimation.mismatch_log import MismatchLog, Rates, make_mismatch_log
-from benchmarks.estimation.rough_count import FAR
 from benchmarks.estimation.validity import judge
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
@@ -27,6 +26,7 @@ from drivetwin.validation.simulate_log import attach_validation
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue
+from tools.result_blocks.accuracy import FAR
 
 POUND_FOOT = 1.3558179483314004
 """N m per lb ft."""

@@ -2,7 +2,8 @@
 """Accuracy and cost of `Model.fit` on nine drivelines.
 
     python -m benchmarks.fit [--problem NAME] [--count N] [--seed SEED] [--workers N]
-                             [--rate HZ] [--mismatch] [--bounds] [--peers] [--coupled] [--paper]
+                             [--rate HZ] [--mismatch] [--rows FILE] [--write] [--bounds] [--peers]
+                             [--coupled] [--paper]
 
 Each realisation has noise on outputs and measured inputs, and priors of 30 % whose means are drawn
 about the truth; the search starts at these means. A minimum is right if its cost is at most 10
@@ -17,10 +18,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import Any
 
 from benchmarks.code_version import read_commit
 from benchmarks.fit.bound import compute_bound, format_bound
 from benchmarks.fit.problems import PROBLEMS, build_problem
+from benchmarks.raw_results import add_options, finish_study
 
 COUNT, SEED = 200, 9000
 """Realisations of each problem, and the seed of the first one."""
@@ -46,6 +49,7 @@ def main() -> int:
     parser.add_argument("--peers", action="store_true", help="compare other programs")
     parser.add_argument("--coupled", action="store_true", help="CoupledClutches alone")
     parser.add_argument("--paper", action="store_true", help="shift of the paper alone")
+    add_options(parser)
     given = parser.parse_args()
     _print(f"Code of commit {read_commit()}.\n")
     if given.bounds:
@@ -72,14 +76,11 @@ def main() -> int:
 
 
 def _run_study(given: argparse.Namespace) -> None:
-    from benchmarks.fit.report import format_problem, format_summary
-    from benchmarks.fit.study import run_study, summarise
+    from benchmarks.fit.study import list_tables, run_study
 
-    found = {}
+    tables: dict[str, list[dict[str, Any]]] = {"logs": [], "values": []}
+    seeds = range(given.seed, given.seed + given.count)
     for name in given.problem:
-        problem = build_problem(name, given.rate)
-        bound = compute_bound(problem)
-        seeds = range(given.seed, given.seed + given.count)
         tries = run_study(
             name,
             seeds,
@@ -87,10 +88,18 @@ def _run_study(given: argparse.Namespace) -> None:
             sigmas_known=not given.estimate_noise,
             mismatch=given.mismatch,
             rate=given.rate,
+            rows=given.rows,
         )
-        found[name] = summarise(tries, bound.std)
-        _print(format_problem(problem, bound, found[name]))
-    _print(format_summary(found))
+        bound = {} if given.mismatch else compute_bound(build_problem(name, given.rate)).std
+        for table, rows in list_tables(name, tries, bound).items():
+            tables[table] += rows
+    command = f"benchmarks.fit --count {given.count} --seed {given.seed}"
+    command += f" --problem {' '.join(map(repr, given.problem))}" * (
+        given.problem != list(PROBLEMS)
+    )
+    command += f" --rate {given.rate:g}" if given.rate else ""
+    command += " --mismatch" * given.mismatch + " --estimate-noise" * given.estimate_noise
+    finish_study("fit-mismatch" if given.mismatch else "fit", command, seeds, tables, given)
 
 
 def _print(text: str) -> None:

@@ -6,8 +6,10 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from benchmarks.fit.problem import (
     record,
 )
 from benchmarks.fit.problems import build_problem
-from drivetwin._util.arrays import FloatArray
+from benchmarks.rows import append_row, read_rows
 from drivetwin.errors import DrivetwinError
 from drivetwin.fit.fixed_numbers import Source, Tolerance
 from drivetwin.fit.recording import Measured, Recording
@@ -44,7 +46,8 @@ class Found:
     std: Mapping[str, float]
     cost: float
     starts: tuple[float, ...] = ()
-    verdicts: Mapping[str, str] | None = None
+    verdicts: Mapping[str, str] = field(default_factory=dict)
+    status: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,8 @@ class Try:
     reached: tuple[int, int]
     seconds: float
     failure: str = ""
+    verdicts: Mapping[str, str] = field(default_factory=dict)
+    status: str = ""
 
     @property
     def is_right(self) -> bool:
@@ -78,6 +83,7 @@ def run_study(
     sigmas_known: bool = True,
     mismatch: bool = False,
     rate: float | None = None,
+    rows: Path | None = None,
 ) -> list[Try]:
     """Fit the realisations of `seeds` of a problem; the result is independent of `workers`.
 
@@ -95,17 +101,24 @@ def run_study(
         Whether the errors of all fixed numbers are drawn from their distributions.
     rate
         Rate of rough channels [Hz]; None for those of the problem.
+    rows
+        File of outcomes, to which new ones are appended; those in it are not computed again.
 
     Returns
     -------
     list of Try
         Outcomes in the order of the seeds.
     """
+    kind = {"problem": name, "sigmas_known": sigmas_known, "mismatch": mismatch, "rate": rate}
     task = partial(fit_once, name, sigmas_known=sigmas_known, mismatch=mismatch, rate=rate)
-    if workers == 1:
-        return [task(seed) for seed in seeds]
+    found = [Try(**one["outcome"]) for one in read_rows(rows) if one["kind"] == kind]
+    done = {one.seed: one for one in found}
     with ProcessPoolExecutor(workers) as pool:
-        return list(pool.map(task, seeds))
+        missing = [seed for seed in seeds if seed not in done]
+        for one in pool.map(task, missing):
+            append_row(rows, {"kind": kind, "outcome": asdict(one)})
+            done[one.seed] = one
+    return [done[seed] for seed in seeds]
 
 
 def fit_once(
@@ -137,6 +150,8 @@ def fit_once(
         found.cost - reference,
         (reached, len(found.starts)),
         seconds,
+        verdicts=found.verdicts,
+        status=found.status,
     )
 
 
@@ -173,6 +188,7 @@ def fit(problem: Problem, drawn: Realisation, means: Values, *, sigmas_known: bo
         float(found.cost),
         tuple(float(one.cost) for one in found.starts),
         {name: str(found.estimates[name].verdict) for name in problem.unknowns},
+        str(found.status),
     )
 
 
@@ -240,56 +256,40 @@ def _price(problem: Problem, means: Values, values: Values) -> float:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Summary:
-    """Summary of a problem; ratios are RMSE over bound by unknown, over the right minima."""
-
-    count: int
-    right: int
-    ratios: Mapping[str, float]
-    coverage: Mapping[str, float]
-    covered: tuple[int, int]
-    seconds: FloatArray
-    failures: Sequence[str]
-
-    @property
-    def mean_ratio(self) -> float:
-        """Root of the mean of (RMSE/bound)² over the unknowns."""
-        return float(np.sqrt(np.mean(np.square(list(self.ratios.values())))))
-
-
-def summarise(tries: Sequence[Try], bounds: Mapping[str, float]) -> Summary:
-    """Summarise the outcomes of a problem.
+def list_tables(
+    problem: str, tries: Sequence[Try], bounds: Mapping[str, float]
+) -> dict[str, list[dict[str, Any]]]:
+    """List the raw results of a problem: one row for each try, and one for each of its values.
 
     Parameters
     ----------
-    tries
-        Outcomes.
+    problem, tries
+        Name of the problem and its outcomes.
     bounds
-        Cramér-Rao bound by unknown, in the scale of the search.
-
-    Returns
-    -------
-    Summary
-        Coverage counts the fits that did not fail, in a wrong minimum as well.
+        Cramér-Rao bound by unknown, in the scale of the search; empty where none is compared.
     """
-    ended = [one for one in tries if not one.failure]
-    right = [one for one in ended if one.is_right]
-    ratios = {
-        name: float(np.sqrt(np.mean([one.errors[name] ** 2 for one in right]))) / bound
-        for name, bound in bounds.items()
-        if right
-    }
-    inside = {
-        name: [abs(one.errors[name]) < HALF * one.std[name] for one in ended] for name in bounds
-    }
-    pooled = [held for by_unknown in inside.values() for held in by_unknown]
-    return Summary(
-        len(tries),
-        len(right),
-        ratios,
-        {name: float(np.mean(held)) for name, held in inside.items() if held},
-        (sum(pooled), len(pooled)),
-        np.array([one.seconds for one in tries]),
-        [f"seed {one.seed}: {one.failure}" for one in tries if one.failure],
-    )
+    logs = [
+        {
+            "seed": one.seed,
+            "kind": problem,
+            "detail": "" if one.is_right else "wrong minimum",
+            "status": one.status or "failed",
+            "right": one.is_right,
+            "seconds": one.seconds,
+            "failure": one.failure,
+        }
+        for one in tries
+    ]
+    values = [
+        {
+            "seed": one.seed,
+            "kind": problem,
+            "name": name,
+            "sort": one.verdicts[name],
+            "apart": error / one.std[name],
+            "ratio": error / bounds[name] if one.is_right and name in bounds else None,
+        }
+        for one in tries
+        for name, error in one.errors.items()
+    ]
+    return {"logs": logs, "values": values}

@@ -12,13 +12,14 @@ standard deviations off.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.raw_results import add_options, finish_study
+from benchmarks.rows import append_row, read_rows
 from benchmarks.tcu.made import Generator
-from benchmarks.tcu.study import format_tables, study_vehicle
+from benchmarks.tcu.study import list_tables, study_vehicle
 
 
 def main() -> int:
@@ -27,24 +28,21 @@ def main() -> int:
     parser.add_argument("generator", type=Path, help="folder of the simulator")
     parser.add_argument("first", type=int, nargs="?", default=0, help="first seed")
     parser.add_argument("count", type=int, nargs="?", default=20, help="vehicles")
-    parser.add_argument("--rows", type=Path, help="file of vehicles")
     parser.add_argument("--clean", action="store_true", help="vehicles that obey the plant")
     parser.add_argument("--wrong", default="", help="tyre, or a key of the card such as mass_kg")
-    options = parser.parse_args()
-    file = options.rows
-    known = file.read_text(encoding="utf-8").splitlines() if file and file.exists() else []
-    vehicles = {one["seed"]: one for one in map(json.loads, known)}
-    wanted = range(options.first, options.first + options.count)
+    add_options(parser)
+    given = parser.parse_args()
+    vehicles = {one["seed"]: one for one in read_rows(given.rows)}
+    wanted = range(given.first, given.first + given.count)
     with tempfile.TemporaryDirectory() as folder:
-        generator = Generator.compile(options.generator, Path(folder), rough=not options.clean)
+        generator = Generator.compile(given.generator, Path(folder), rough=not given.clean)
         for seed in wanted:
-            if seed in vehicles:
-                continue
-            vehicles[seed] = study_vehicle(generator, seed, options.wrong)
-            if file:
-                with file.open("a", encoding="utf-8") as rows:
-                    rows.write(json.dumps(vehicles[seed]) + "\n")
-    sys.stdout.write(format_tables([vehicles[seed] for seed in wanted]))
+            if seed not in vehicles:
+                vehicles[seed] = study_vehicle(generator, seed, given.wrong)
+                append_row(given.rows, vehicles[seed])
+    command = f"benchmarks.tcu GENERATOR {given.first} {given.count}{' --clean' * given.clean}"
+    command += f" --wrong {given.wrong}" if given.wrong else ""
+    finish_study("tcu", command, wanted, list_tables([vehicles[seed] for seed in wanted]), given)
     return 0
 
 

@@ -15,6 +15,7 @@ import tomlkit
 
 from benchmarks.tcu.made import Generator, list_truth
 from drivetwin.channels.units import RPM
+from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.tcu.card import USUAL, load_controller_card
 from drivetwin.tcu.outcome import identify_controller
 from drivetwin.tcu.statements import find_used_pressure, list_used
@@ -101,60 +102,44 @@ def load_deviation(table: Mapping[str, Any], key: str) -> tuple[float, float]:
     return float(entry), USUAL[key] * float(entry)
 
 
-def format_tables(vehicles: Sequence[Mapping[str, Any]]) -> str:
-    """Format the tables of the study."""
-    return "\n".join([*_format_shifts(vehicles), *_format_numbers(vehicles)]) + "\n"
-
-
-def _format_shifts(vehicles: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the lines on held-out shifts."""
-    shifts = [one for each in vehicles for one in each["shifts"]]
-    turbine = np.array([one["rms"][1] for one in shifts])
-    share = np.array([abs(one["error"]) / one["duration"] for one in shifts])
-    inside = np.array([one["inside"] for one in shifts])
-    rows = np.array([one["rows"] for one in shifts])
-    kept = np.mean([abs(one["error"]) <= one["band"] for one in shifts])
-    seconds = [one["seconds"] for one in vehicles]
-    statuses = [one["status"] for one in vehicles]
-    counts = ", ".join(f"{name} {statuses.count(name)}" for name in dict.fromkeys(statuses))
-    spent = f"CPU {np.median(seconds):.0f} s (largest {max(seconds):.0f} s)"
-    yield f"{len(vehicles)} vehicles: {counts}; {spent}; {len(shifts)} held-out shifts"
-    few = f"at most 80 rpm in {np.mean(turbine <= 80.0):.1%} (largest {turbine.max():.0f} rpm)"
-    yield f"turbine speed rms, median {np.median(turbine):.1f} rpm, {few}"
-    near = f"within 10 % in {np.mean(share < 0.1):.1%}"
-    yield f"duration, median error {np.nanmedian(share):.1%}, {near}"
-    pooled = (inside * rows[:, None]).sum(axis=0) / rows.sum()
-    text = ", ".join(f"{one:.1%}" for one in pooled)
-    yield f"rows inside the 95 % band (engine, turbine, output): {text}; durations {kept:.1%}"
-    for kind in sorted({one["kind"] for one in shifts}):
-        own = [one["rms"][1] for one in shifts if one["kind"] == kind]
-        yield f"  {kind}: {len(own)} shifts, median {np.median(own):.1f} rpm"
-
-
-def _format_numbers(vehicles: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield the lines on stated quantities, and those identified that are far off."""
-    every: dict[str, list[tuple[float, str]]] = {}
-    far = []
-    for each in vehicles:
-        for one in each["numbers"]:
-            apart = (one["value"] - one["truth"]) / one["std"]
-            quantity = one["name"].rpartition(".")[2]
-            every.setdefault(quantity, []).append((apart, one["verdict"]))
-            if one["verdict"] == "identified" and abs(apart) > 3.0:
-                far.append(f"{each['seed']} {one['name']} {apart:+.1f}")
-    stated = [one for group in every.values() for one in group if one[1] in ("identified", "weak")]
-    known = [apart for apart, verdict in stated if verdict == "identified"]
-    share = np.mean(np.abs([one[0] for one in stated]) <= _Z95)
-    yield f"identified and weak: {share:.1%} of {len(stated)} inside"
-    yield f"identified beyond 3 deviations: {len(far)} of {len(known)}"
-    yield f"  far off: {', '.join(far) or 'none'}"
-    valid = {str(one["seed"]) for one in vehicles if one["status"] == "valid"}
-    misled = valid.intersection(one.partition(" ")[0] for one in far)
-    yield f"vehicles valid with an identified number beyond 3 deviations: {len(misled)}"
-    yield "quantity                inside  of  identified  mean z  spread of z"
-    for name, group in every.items():
-        apart = np.array([one[0] for one in group])
-        inside = int(np.count_nonzero(np.abs(apart) <= _Z95))
-        count = sum(verdict == "identified" for _, verdict in group)
-        line = f"{name:22s} {inside:7d} {apart.size:3d} {count:11d} {np.mean(apart):7.2f}"
-        yield f"{line} {np.std(apart):12.2f}"
+def list_tables(vehicles: Sequence[Mapping[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    """List the raw results: one row for each vehicle, for each stated value and held-out shift."""
+    logs = [
+        {
+            "seed": each["seed"],
+            "kind": "vehicle",
+            "status": each["status"],
+            "seconds": each["seconds"],
+            "failure": "",
+        }
+        for each in vehicles
+    ]
+    values = [
+        {
+            "seed": each["seed"],
+            "kind": one["name"].rpartition(".")[2],
+            "name": one["name"],
+            "sort": one["verdict"],
+            "apart": (one["value"] - one["truth"]) / one["std"],
+            "width": _Z95 * one["std"] / abs(one["truth"]) if one["truth"] else 0.0,
+        }
+        for each in vehicles
+        for one in each["numbers"]
+        if one["verdict"] in (Verdict.IDENTIFIED, Verdict.WEAK)
+    ]
+    shifts = [
+        {
+            "seed": each["seed"],
+            "kind": one["kind"],
+            "one": 1,
+            "rms": one["rms"][1],
+            "duration": one["duration"],
+            "error": one["error"],
+            "band": one["band"],
+            "rows": one["rows"],
+            **dict(zip(("engine", "turbine", "output"), one["inside"], strict=True)),
+        }
+        for each in vehicles
+        for one in each["shifts"]
+    ]
+    return {"logs": logs, "values": values, "shifts": shifts}

@@ -15,31 +15,33 @@ import pytest
 
 from benchmarks.estimation.rough import (
     judge_friction,
+    list_tables,
     make_vehicle,
     plan_vehicle,
-    read_results,
     run_study,
 )
 from benchmarks.estimation.rough_card import draw_ratio_text, write_card
-from benchmarks.estimation.rough_count import (
-    FAR,
-    RoughLog,
-    compute_kept,
-    compute_share,
-    summarise,
-)
+from benchmarks.estimation.rough_log import RoughLog
 from benchmarks.estimation.unlisted import UNLISTED, UnlistedId, add_unlisted
 from benchmarks.estimation.validity import (
-    VISIBLE,
     StudyLog,
     make_log,
     make_sized_log,
     study_log,
 )
-from benchmarks.estimation.validity import summarise as summarise_validity
+from benchmarks.estimation.validity import list_tables as list_validity
 from benchmarks.estimation.vehicles import draw_vehicle
+from benchmarks.rows import append_row, read_rows
 from drivetwin.estimation.result.estimate import FrictionCurve
 from drivetwin.vehicle.effects import EffectId
+from tools.result_blocks.accuracy import (
+    FAR,
+    format_share,
+    write_causes,
+    write_far,
+    write_groups,
+    write_statuses,
+)
 
 BARE = 4
 """Seed of a vehicle that obeys the model and whose card states no gain with an error."""
@@ -164,47 +166,47 @@ def _make_log(seed: int, errors: dict[str, float], **other: Any) -> RoughLog:
     return RoughLog(seed, "obeying", "", 0.0, "valid", 13, errors, **other)
 
 
-def test_bootstrap_draws_logs_and_not_values() -> None:
+def test_standard_error_is_that_of_logs_and_not_of_values() -> None:
     """Of n logs with ten values each that are inside or outside together, the standard deviation
     of the share is √(p(1 - p)/n), and not that of 10 n values."""
-    parts = [10 * (k % 4 != 0) for k in range(100)]
-    share = compute_share(parts, [10] * 100)
-    assert (share.part, share.whole) == (750, 1000)
-    half = 1.96 * np.sqrt(0.75 * 0.25 / 100.0)
-    assert (share.low, share.high) == pytest.approx((0.75 - half, 0.75 + half), abs=0.012)
-    even = compute_share([9] * 100, [10] * 100)
-    assert (even.low, even.high) == (0.9, 0.9)
-    assert str(compute_share([], [])) == "none"
-    assert str(compute_share([0], [0])) == "none"
+    pairs = [(10 * (k % 4 != 0), 10) for k in range(100)]
+    assert format_share(pairs) == "750 of 1000, 75.0 ± 4.3 %"
+    assert format_share([(9, 10)] * 100) == "900 of 1000, 90.0 ± 0.0 %"
+    assert format_share([(0, 0)]) == "–"
+
+
+def _to_raw(tables: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
+    return {
+        name: {"columns": list(rows[0]), "rows": [list(one.values()) for one in rows]}
+        for name, rows in tables.items()
+    }
 
 
 def test_log_without_result_keeps_nothing() -> None:
-    share = compute_kept([11, 0], [13, 13])
-    assert (share.part, share.whole) == (11, 26)
     logs = [
-        _make_log(1, {f"p{k}": 0.0 for k in range(11)}),
+        _make_log(1, {f"p{k}": 4.5 * (k == 3) for k in range(11)}),
         RoughLog(2, "obeying", "", 0.0, "no result", 13, failure="2 faults\n  - gain_m3"),
     ]
-    text = "\n".join(summarise(logs))
-    assert "kept              11 of 26 = 42.3 %" in text
-    assert "inside            11 of 11 = 100.0 %" in text
-    assert "statuses          valid 1, no result 1" in text
-    assert "1 x 2 faults" in text
-    assert "mu_gain inside    not reported" in text
+    raw = _to_raw(list_tables(logs))
+    row = "| obeying | 2 | 1 | 10 of 11, 90.9 ± 0.0 % | 1 | – | 11 of 26, 42.3 ± 29.9 % |"
+    assert row in write_groups(raw)
+    assert "| 1 | obeying |  | valid | p3 +4.5 |" in write_far(raw)
+    assert "valid 1, no result 1.\nSeed 2: 2 faults" in write_statuses(raw)
 
 
 def test_finished_seeds_are_read_and_not_run_again(tmp_path: Path) -> None:
-    output = tmp_path / "rough.jsonl"
+    rows = tmp_path / "rough.jsonl"
     logs = [_make_log(seed, {"eta": 0.1 * seed}) for seed in (3, 4)]
     lines = [json.dumps(asdict(one)) for one in logs]
-    output.write_text("\n".join([*lines, lines[0][:30]]), encoding="utf-8")
-    assert read_results(output) == {3: logs[0], 4: logs[1]}
-    assert run_study([3, 4], output, 1) == logs
-    assert output.read_text(encoding="utf-8").endswith("\n")
-    assert read_results(tmp_path / "none.jsonl") == {}
+    rows.write_text("\n".join([*lines, lines[0][:30]]), encoding="utf-8")
+    append_row(rows, {"seed": 5})
+    assert [one["seed"] for one in read_rows(rows)] == [3, 4, 5]
+    rows.write_text("\n".join(lines), encoding="utf-8")
+    assert run_study([3, 4], rows, 1) == logs
+    assert read_rows(tmp_path / "none.jsonl") == []
 
 
-def test_validity_counts_kept_moved_and_certain() -> None:
+def test_validity_counts_causes_and_effects_by_kind() -> None:
     errors = {f"p{k}": 0.0 for k in range(8)}
     right, missed, quiet = ("tyre_slip",), ("backlash",), ()
     logs = [
@@ -219,10 +221,16 @@ def test_validity_counts_kept_moved_and_certain() -> None:
         ),
         StudyLog(4, "tyre_slip", 0.0, {}, {}, (), 0.0, False, "refused", 10),
         StudyLog(5, "", 0.0, errors, {}, (), 0.0, False, "", 10, None, None, 1.0, "valid"),
+        StudyLog(6, "tyre_slip+backlash", 0.0, errors, {}, right, 9.0, False, "", 10),
     ]
-    text = "\n".join(summarise_validity(logs))
-    assert "right cause of effects that move a value by over 2: 1 of 2" in text
-    assert f"by over 2 and have over {VISIBLE:.1f} nats alone: 1 of 1" in text
-    assert "causes called certain at chi2 above 1.2: 1" in text
-    assert "kept of departing 24 of 40 = 60.0 %" in text
-    assert "kept of obeying 8 of 10 = 80.0 %" in text
+    raw = _to_raw(list_validity(logs))
+    lines = write_causes(raw).splitlines()[2:]
+    assert [line.split("|")[2].strip() for line in lines] == [
+        *("1 of 2", "1 of 2", "1 of 1", "0 of 1", "1 of 6"),
+    ]
+    kept = {
+        line.split("|")[1].strip(): line.split("|")[7] for line in write_groups(raw).splitlines()
+    }
+    assert kept["tyre_slip"].startswith(" 24 of 40, 60.0 ")
+    assert kept["none"].startswith(" 8 of 10")
+    assert kept["two effects"].startswith(" 8 of 10")

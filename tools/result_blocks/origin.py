@@ -16,6 +16,12 @@ def write_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
+def read_rows(raw: Raw, name: str) -> list[dict[str, Any]]:
+    """Read a table of raw results as rows by column."""
+    table = raw[name]
+    return [dict(zip(table["columns"], one, strict=True)) for one in table["rows"]]
+
+
 def write_origin(raw: Raw) -> str:
     """Write machine, compilers with their flags, versions, seeds and how times were taken."""
     origin = raw["origin"]

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.constants import bar
-from scipy.signal import lfilter
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
@@ -71,6 +70,8 @@ _LEAST_KISS = 0.05
 def lag_signal(time: FloatArray, values: FloatArray, lag: float) -> FloatArray:
     """Compute a first-order lag (N,) of a signal on an even grid `time` (N,) [s], linear between
     its points and at rest before them."""
+    from scipy.signal import lfilter  # loading takes 0.2 s, and most commands do without it
+
     step = float(time[1] - time[0])
     fall = np.exp(-step / lag)
     share = lag / step * (1.0 - fall)
