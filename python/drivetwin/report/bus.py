@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivetwin._util.display_units import RPM, format_uncertainty
-from drivetwin.bus.decay import DecayPrediction, JointDecay
+from drivetwin.bus.decay import DECAY, DecayPrediction, JointDecay
 from drivetwin.bus.identify import BusIdentification, identify_bus
 from drivetwin.bus.phases import Timeline
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import InputError
+from drivetwin.estimation.direct.ringdown import RING_DOWN
 from drivetwin.estimation.result.estimate import Z95, Estimate, Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.bus_file import BusFile, BusPredictionRecord, build_bus_file
@@ -254,7 +255,9 @@ def _build_decay_tables(found: BusIdentification) -> Iterator[Block]:
 
 def _build_decays(found: BusIdentification) -> Iterator[Block]:
     for gear, joint in found.decays.items():
-        yield FigureBlock(_plot_decays(joint), f"Decays in gear {gear}, the first {_SHOWN}.")
+        window = f"from {RING_DOWN.latest_start:g} s after lock-up for at most {DECAY.length:g} s"
+        caption = f"Decays in gear {gear}, the first {_SHOWN}; fitted {window}."
+        yield FigureBlock(_plot_decays(joint), caption)
 
 
 def _plot_decays(joint: JointDecay) -> Figure:
