@@ -13,6 +13,7 @@ from drivetwin.fit.fit import fit_network
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.synthesize import ModelName
 from tests.support.fits import fit_log, make_log
+from tests.support.repeats import mark_repeats
 
 NAME = "wheel speed"
 
@@ -21,7 +22,7 @@ def list_orders(found: ModelFit) -> list[Finding]:
     return [one for one in found.findings if one.code is Code.RESIDUAL_ORDER]
 
 
-@pytest.mark.parametrize("order", [1, 3])
+@pytest.mark.parametrize("order", mark_repeats([1, 3], [3]))
 def test_an_error_once_or_thrice_per_turn_is_named_with_its_shaft(order: int) -> None:
     made = make_log(ModelName.CONVERTER_LOCK_UP)
     speed = made.recording.outputs[NAME]

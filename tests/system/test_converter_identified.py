@@ -17,6 +17,7 @@ from drivetwin.shifts.detect import detect_shifts
 from drivetwin.validation.validated_model import identify_validated
 from drivetwin.vehicle.card import load_card
 from tests.shifts.fixtures import shared
+from tests.support.repeats import mark_repeats
 from tests.support.synth import synthesize
 
 
@@ -38,7 +39,7 @@ def test_noise_that_turbine_and_its_torque_share_is_no_sign_of_means(tmp_path: P
         assert one.value == pytest.approx(truth[name]["value"], abs=2.0 * one.std_noise), name
 
 
-@pytest.mark.parametrize("card", ["c1", "c2"])
+@pytest.mark.parametrize("card", mark_repeats(["c1", "c2"], ["c2"]))
 def test_a_map_that_is_off_at_each_point_is_corrected(card: str) -> None:
     """Points off by up to 3 %: the log gave no value, or a wrong cause."""
     folder = "cases/rough_converter"

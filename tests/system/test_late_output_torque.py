@@ -21,6 +21,7 @@ def make_log(path: Path, *effects: str) -> None:
     assert main(["synth", "--seed", "5", *named, "-o", str(path)]) == 0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.timeout(600)  # 45 s of CPU time: two effects, and the tyre as an element
 def test_the_fit_starts_from_the_part_of_a_found_delay_that_is_none_of_the_tyre(
     tmp_path: Path,
