@@ -32,6 +32,8 @@ Evaluate = Callable[[Sequence[FloatArray]], list[float]]
 """Objectives of candidates: coordinates (q,) from 0 to 1."""
 _EDGE = 1e-3
 """Distance of a start from the bounds: CMA-ES has no room on them."""
+_DRAWS = 64
+"""Scenarios of the other optimisers."""
 _EVALUATIONS = 4000
 """Candidates of each start of CMA-ES."""
 _DIFFERENCE = 2e-5
@@ -103,7 +105,7 @@ def run_cma(task: Task, fresh: Scenarios, limit: float) -> Entry:
 def run_lbfgs(task: Task, fresh: Scenarios, limit: float) -> Entry:
     """Run L-BFGS on a soft maximum of jerk by differences, from random starts after the first."""
     space, plant = Space(task.policy), make_quick_plant(task)
-    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    draws = draw_for(task, _DRAWS, Purpose.POLISH)
     objective = build_objective(task, plant)
     random = np.random.default_rng(task.seed)
 
@@ -172,7 +174,7 @@ def _run_within(
     """Run a search until its CPU time [s] is used up; `tried` are plant and fresh draws."""
     space, (plant, fresh) = Space(task.policy), tried
     watch = Watch(limit, time.process_time())
-    draws = draw_for(task, task.settings.polish_draws, Purpose.POLISH)
+    draws = draw_for(task, _DRAWS, Purpose.POLISH)
     objective = build_objective(task, plant)
 
     def evaluate(candidates: Sequence[FloatArray]) -> list[float]:

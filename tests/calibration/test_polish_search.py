@@ -3,21 +3,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from drivetwin.calibration.calibrate import draw_for
-from drivetwin.calibration.objective import CalibrationSettings
 from drivetwin.calibration.polish import Candidate, search_minima
 from drivetwin.calibration.scenarios import Purpose
 from drivetwin.calibration.spread import Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from tests.calibration.twins import make_exact_twin
 from tests.support.arrays import FloatArray
-
-SETTINGS = CalibrationSettings(starts=4, hops=200)
 
 
 def improve(at: FloatArray) -> Candidate:
@@ -28,17 +23,32 @@ def improve(at: FloatArray) -> Candidate:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_hops_reach_the_best_of_many_minima(seed: int) -> None:
-    start = np.full(4, 0.25)
-    found = search_minima(improve, start, SETTINGS, seed)
+    start = [np.full(4, 0.25)]
+
+    def search(hops: int) -> list[Candidate]:
+        return search_minima(improve, start, hops, 0.07, np.random.default_rng(seed))
+
+    found = search(200)
     values = [one.value for one in found]
     assert values == sorted(values)
     assert values[0] <= 0.011
-    alone = search_minima(improve, start, replace(SETTINGS, hops=0), seed)
+    alone = search(2)
     assert alone[0].value > 5.0 * values[0]
     coordinates = {tuple(one.coordinates.round(3).tolist()) for one in found}
     assert len(coordinates) == len(found)
-    again = search_minima(improve, start, SETTINGS, seed)
-    assert [one.value for one in again] == values
+    assert [one.value for one in search(200)] == values
+
+
+def test_hops_move_a_profile_in_time() -> None:
+    """The minima are one bump at several knots, too far apart for steps of the coordinates."""
+    bumps = np.eye(6)
+
+    def improve(at: FloatArray) -> Candidate:
+        nearest = int(np.argmin(np.abs(bumps - at).sum(axis=1)))
+        return Candidate(bumps[nearest], float(nearest))
+
+    found = search_minima(improve, [bumps[4]], 400, 0.05, np.random.default_rng(0))
+    assert found[0].value == 0.0
 
 
 def test_draws_of_the_optimiser_are_designed_and_others_random() -> None:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, eye_array, hstack, kron, vstack
+from scipy.stats import qmc
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import TimedStages
@@ -297,13 +298,23 @@ def _search(task: Task, plant: Plant, objective: Objective) -> list[Candidate]:
         return [Candidate(space.start, float("inf"))]
     coarse = set_coarse_step(plant)
     few = _make_run(task, coarse, draw_for(task, settings.search_draws, Purpose.SEARCH))
-    other = _make_run(task, coarse, draw_for(task, settings.tail_draws, Purpose.TAIL))
+    many = _make_run(task, coarse, draw_for(task, settings.polish_draws, Purpose.POLISH))
+
+    def screen(at: FloatArray) -> Candidate:
+        found = polish(few, at, objective, settings.search_iterations).coordinates
+        return Candidate(found, objective.evaluate(many([found], None)[0]))
 
     def improve(at: FloatArray) -> Candidate:
-        found = polish(few, at, objective, settings.search_iterations).coordinates
-        return Candidate(found, objective.evaluate(other([found], None)[0]))
+        return polish(many, at, objective, settings.tail_iterations)
 
-    return search_minima(improve, space.start, settings, task.seed)
+    random = np.random.default_rng([task.seed, 5])
+    count, size = settings.starts // 2, space.start.size
+    near = space.start + settings.initial_step * random.standard_normal((count, size))
+    far = qmc.Sobol(size, seed=random).random_base2(count.bit_length())[:count]
+    starts, step = [space.start, *near, *far], settings.hop_step
+    pool = search_minima(screen, starts, settings.hops, step, random)
+    best = [one.coordinates for one in pool[: settings.finalists]]
+    return search_minima(improve, best, settings.late_hops, step, random)
 
 
 def _polish(

@@ -30,23 +30,25 @@ class CalibrationSettings:
     """Effort and tolerances of search, polish and certificate."""
 
     starts: int = 20
-    """Short polishes from random starts; the problem has many local minima. 0 polishes the start
-    alone."""
-    hops: int = 30
-    """Short polishes from hops of the best minima."""
+    """Short polishes on few draws, one half from points of the whole ranges, the other about the
+    start; the problem has many local minima. 0 polishes the start alone, without a search."""
+    hops: int = 24
+    """Short polishes on few draws, from hops of the best minima."""
+    late_hops: int = 6
+    """Polishes on more draws, from hops of the best minima."""
     finalists: int = 2
-    """Minima that are polished again on the draws for the tail."""
+    """Minima that take part in the next stage."""
     initial_step: float = 0.15
-    """Standard deviation of the random starts, in shares of the ranges."""
+    """Standard deviation of the starts about the start, in shares of the ranges."""
     hop_step: float = 0.07
     """Standard deviation of a hop, in shares of the ranges."""
     search_draws: int = 32
     """Scenarios of a short polish."""
-    search_iterations: int = 20
+    search_iterations: int = 10
     """Largest number of linear programs of a short polish."""
-    polish_draws: int = 64
-    """Scenarios by which minima are compared, and those of repairs."""
-    tail_draws: int = 256
+    polish_draws: int = 256
+    """Scenarios of hops, by which minima are compared, and those of repairs."""
+    tail_draws: int = 1024
     """Scenarios of the last polish, which shapes the tail."""
     check_draws: int = 2000
     """Scenarios on which limits are derived from the start, and checked after the polish."""
@@ -93,6 +95,7 @@ class CalibrationSettings:
             self,
             starts=max(1, round(factor * self.starts)),
             hops=round(factor * self.hops),
+            late_hops=round(factor * self.late_hops),
             tail_iterations=max(1, round(factor * self.tail_iterations)),
         )
 
@@ -187,10 +190,6 @@ class Objective:
             for one, margin in zip(self.limits, margins, strict=True)
         )
         return replace(self, limits=limits)
-
-    def scale_weight(self, factor: float) -> Objective:
-        """Return the objective with another weight of the excesses."""
-        return replace(self, weight=factor * self.weight)
 
 
 SOURCES: Mapping[Metric, str] = {

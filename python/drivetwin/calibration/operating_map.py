@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise, product
+from operator import getitem
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
@@ -85,10 +86,6 @@ class Grid:
         places = product(*(range(len(axis)) for axis in self.axes))
         return sorted(places, key=lambda one: _measure_distance(one, self.start))
 
-    def get_point(self, place: Place) -> OperatingPoint:
-        """Return the operating point of a place."""
-        return OperatingPoint(*(axis[k] for axis, k in zip(self.axes, place, strict=True)))
-
     @property
     def centres(self) -> list[OperatingPoint]:
         """Operating points in the middle of the cells."""
@@ -139,7 +136,9 @@ def calibrate_map(make_task: MakeTask, grid: Grid) -> OperatingMap:
     A point may exceed a limit; its certificate says so. Raises InputError for an operating point
     that has no such policy.
     """
-    tasks = {place: make_task(grid.get_point(place)) for place in grid.places}
+    tasks = {
+        place: make_task(OperatingPoint(*map(getitem, grid.axes, place))) for place in grid.places
+    }
     rest = grid.places[1:]
     timed = _STAGES.repeat("point", len(rest)).repeat("between", len(grid.centres))
     with timed.enter("main"):

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Search for policy values: global hops, local polish, and repair of exceeded limits.
 
-The search goes by short polishes from random starts, then from hops of a pool of the best. A
-polish is sequential linear programming with a trust region: in each step peak jerk and limits are
-linear in the coordinates, by forward differences over the scenarios near their tails. The linear
-program minimises the tail mean of peak jerk in its epigraph form and the excess over limits.
+The search goes by short polishes on few draws, from points of the whole ranges and about the start
+and from hops of a pool of the best, then by hops on more draws. A polish is sequential linear
+programming with a trust region: in each step peak jerk and limits are linear in the coordinates, by
+forward differences over the scenarios near their tails. The linear program minimises the tail mean
+of peak jerk in its epigraph form and the excess over limits.
 
 Sources: D. Wales and J. Doye, Global optimization by basin-hopping, J. Phys. Chem. A 101 (1997);
 J. Nocedal and S. J. Wright, Numerical Optimization, section 18.5 (Sℓ1LP); R. T. Rockafellar and S.
@@ -14,7 +15,7 @@ Uryasev, Journal of Risk 2 (2000), for the tail mean.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from drivetwin._util.display_units import spell_unit
 from drivetwin._util.progress import notify_progress
 from drivetwin.calibration.certificate import LimitCheck
 from drivetwin.calibration.metrics import METRICS, Metric, Outcome
-from drivetwin.calibration.objective import CalibrationSettings, Objective, Statistic
+from drivetwin.calibration.objective import Objective, Statistic
 from drivetwin.errors import InfeasibleError
 
 _POOL = 6
@@ -39,7 +40,7 @@ _RANK = 1.2
 _PARTIAL, _PARTIAL_STEP = 0.3, 2.5
 """Share of the coordinates that a partial hop moves, and its step over that of a full one."""
 _CROSS_STEP = 0.3
-"""Step of a hop between two minima, over that of a full one."""
+"""Step of a hop towards other coordinates, over that of a full one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,41 +53,44 @@ class Candidate:
 
 def search_minima(
     improve: Callable[[FloatArray], Candidate],
-    start: FloatArray,
-    settings: CalibrationSettings,
-    seed: int,
+    starts: Sequence[FloatArray],
+    hops: int,
+    step: float,
+    random: np.random.Generator,
 ) -> list[Candidate]:
-    """Return the pool of minima, best first.
+    """Return the pool of minima, best first, from `starts` (q,) and then from hops of the pool.
 
-    `improve` polishes coordinates (q,) and returns them with the objective on other draws.
+    `improve` polishes coordinates (q,) and returns them with their objective; `step` is that of a
+    hop, in shares of the ranges.
     """
-    random = np.random.default_rng([seed, 5])
-    total, pool = settings.starts + settings.hops, list[Candidate]()
+    total, pool = len(starts) + hops, list[Candidate]()
     for number in range(total):
         notify_progress(number / total)
-        if number == 0:
-            at = start
-        elif number < settings.starts:
-            at = start + settings.initial_step * random.standard_normal(start.size)
-        else:
-            at = _hop(pool[:_POOL], settings.hop_step, random)
+        at = starts[number] if number < len(starts) else _hop(pool, step, random)
         found = improve(np.clip(at, 0.0, 1.0))
         near = [one for one in pool if np.abs(one.coordinates - found.coordinates).max() < _CLOSE]
         if all(found.value < one.value for one in near):
             others = (one for one in pool if one not in near)
-            pool = sorted([*others, found], key=lambda one: one.value)
-    return pool[:_POOL]
+            pool = sorted([*others, found], key=lambda one: one.value)[:_POOL]
+    return pool
 
 
 def _hop(pool: list[Candidate], step: float, random: np.random.Generator) -> FloatArray:
-    """Move from a minimum of the pool: all coordinates, some, or towards another minimum."""
+    """Move from a minimum of the pool: all coordinates, some, or towards other coordinates.
+
+    These are another minimum, or the same with each coordinate in place of its neighbour: the next
+    minimum of a profile is often the same profile one knot earlier or later.
+    """
     at = pool[min(int(random.exponential(_RANK)), len(pool) - 1)].coordinates
-    noise, kind = random.standard_normal(at.size), random.random()
-    if kind < 0.5:
+    noise, kind = random.standard_normal(at.size), random.integers(4)
+    if kind == 0:
         return at + step * noise
-    if kind < 0.75:
+    if kind == 1:
         return at + _PARTIAL_STEP * step * noise * (random.random(at.size) < _PARTIAL)
-    other = pool[int(random.integers(len(pool)))].coordinates
+    shifted = np.arange(at.size) + random.choice((-1, 1))
+    other: FloatArray = at[shifted.clip(0, at.size - 1)]
+    if kind == 2:
+        other = pool[int(random.integers(len(pool)))].coordinates
     return at + random.uniform(-0.3, 1.3) * (other - at) + _CROSS_STEP * step * noise
 
 
@@ -343,7 +347,7 @@ def keep_limits(
             break
         beyond = [max(one, 0.0) for one in excesses]
         tighter = objective.tighten([one / (1.0 + one) for one in beyond])
-        objective = tighter.scale_weight(factor)
+        objective = replace(tighter, weight=factor * tighter.weight)
         at = improve(at, objective)
     return min(tried, key=lambda one: max(one.value, 0.0))
 

@@ -380,7 +380,7 @@ class TwinDraws:
     def __call__(self, random: np.random.Generator) -> MakeDriveline | None:
         """Draw a type; None where it is impossible."""
         known = self._known
-        values = known.draw(random, self._directions)
+        values = known.draw(random, known.directions)
         model = known.draw_model(values, random)
         if model is None:
             return None
@@ -396,10 +396,6 @@ class TwinDraws:
     @cached_property
     def _known(self) -> ModelDistribution:
         return describe_model(self.twin, self.shift, self.drawn_ids)
-
-    @cached_property
-    def _directions(self) -> FloatArray:
-        return self._known.directions
 
     @cached_property
     def drawn_ids(self) -> list[str]:

@@ -17,7 +17,7 @@ from drivetwin.calibration.calibrate import (
 )
 from drivetwin.calibration.certificate import compute_quantiles
 from drivetwin.calibration.evaluate import Plant
-from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, Profiles, check_gears
+from drivetwin.calibration.maneuver import Maneuver, OperatingPoint, check_gears
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import (
     CalibrationSettings,
@@ -114,20 +114,6 @@ def _bound_kiss(
         for one in policy.parameters
         if one.name == "kiss_pressure" and one.unit == "Pa" and one.start <= highest
     }
-
-
-def build_profiles(
-    twin: Twin, request: Request, values: Mapping[str, float]
-) -> tuple[Maneuver, Profiles | None]:
-    """Build the shift of a request and the profiles that policy values by name command in it.
-
-    None for a closed loop, whose commands follow from the slip of the vehicle. Raises as
-    `build_task`.
-    """
-    task = build_task(twin, replace(request, limits=()))
-    starts = {one.name: one.start for one in task.policy.parameters}
-    control = task.policy.build_control(np.array(list({**starts, **values}.values())))
-    return task.maneuver, control if isinstance(control, Profiles) else None
 
 
 def choose_start(twin: Twin, request: Request, starts: Sequence[Mapping[str, float]]) -> Request:

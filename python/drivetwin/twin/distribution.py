@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -95,7 +96,7 @@ class ModelDistribution:
     covariance: FloatArray
     scales: Mapping[str, float]
 
-    @property
+    @cached_property
     def directions(self) -> FloatArray:
         """Columns (p, r) of one standard deviation each, independent of each other."""
         scale = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
