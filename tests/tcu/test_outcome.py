@@ -225,6 +225,8 @@ def test_a_plant_that_is_not_that_of_the_log_is_not_valid_with_wrong_numbers(
         if one["verdict"] == "identified"
     }
     assert found["status"] != "valid" or max(map(abs, far.values()), default=0.0) < 3.0, far
+    # The number that is wrong is named, among all that it moves.
+    assert (wrong == "tyre") or "contradicts the stated J_engine" in str(found)
 
 
 def test_a_wrong_ratio_gives_no_value(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.special import ndtr
 
 from drivetwin.channels.units import RPM
 from drivetwin.errors import IdentificationError, InputError, Where
@@ -29,6 +30,12 @@ shift."""
 _LEAST_INSIDE = 0.8
 """Share of the rows of held-out shifts inside the 95 % band below which the band is no band: so few
 have a probability of 1 % for one shift in four that is missed."""
+
+
+_CONTRADICTION = 0.01
+"""Probability, over all numbers together, below which a log contradicts a number of the card."""
+_LEAST_SHARE = 1e-4
+"""Least share of the prior variance that a log takes away in that test [ratio]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,22 +136,51 @@ def _find_held(shifts: Sequence[ControllerShift], wanted: Collection[int] | None
 
 
 def _judge(found: FittedShifts, predictions: Sequence[PredictedShift]) -> tuple[ModelStatus, str]:
-    """Judge the plant by the residuals of fitted shifts and the bands of held-out ones."""
+    """Judge the plant by residuals of fitted shifts, bands of held-out ones, and the card."""
     size = max(found.noise.sigma[name] for name in SPEEDS)
-    shown = f"The speeds of the fitted shifts are met to {size / RPM:.1f} rpm rms"
+    text = f"The speeds of the fitted shifts are met to {size / RPM:.1f} rpm rms"
+    name, apart, chance = find_contradiction(found)
+    contradicts = ""
+    if chance < _CONTRADICTION:
+        contradicts = f" The log contradicts the stated {name} by {apart:.1f} standard deviations: "
+        contradicts += "check the exact and tight values of the card."
     if size > FLOOR:
         return ModelStatus.NOT_VALID, (
-            f"{shown}, worse than the {FLOOR / RPM:.0f} rpm that the intervals include: the model "
-            "lacks something. Check ratios, levers and converter of the card."
+            f"{text}, worse than the {FLOOR / RPM:.0f} rpm that the intervals include: the model "
+            f"lacks something. Check ratios, levers and converter of the card.{contradicts}"
         )
     if not predictions:
-        return ModelStatus.NOT_VALIDATED, f"{shown}; no shift was held out."
+        return ModelStatus.NOT_VALIDATED, f"{text}; no shift was held out.{contradicts}"
     rows = sum(int(np.count_nonzero(one.rows)) for one in predictions)
     inside = sum(float(np.mean(one.inside)) * np.count_nonzero(one.rows) for one in predictions)
     share = inside / rows
-    text = f"{shown}; {100.0 * share:.0f} % of the rows of {len(predictions)} held-out shifts are "
-    text += "inside the 95 % band."
-    return ModelStatus.VALID if share >= _LEAST_INSIDE else ModelStatus.LIMITED, text
+    text += f"; {100.0 * share:.0f} % of the rows of {len(predictions)} held-out shifts are inside "
+    text += f"the 95 % band.{contradicts}"
+    is_valid = share >= _LEAST_INSIDE and not contradicts
+    return ModelStatus.VALID if is_valid else ModelStatus.LIMITED, text
+
+
+def find_contradiction(found: FittedShifts) -> tuple[str, float, float]:
+    """Find the shared number that a fit moves farthest from its prior.
+
+    Where prior and log agree, the move is normal with the variance that the log takes away from the
+    prior (Box 1980).
+
+    Returns
+    -------
+    tuple
+        Name, move in standard deviations of the move, and the probability of one as large among all
+        numbers.
+    """
+    own = found.coordinates
+    shared = [own.names.index(name) for name in own.get_shared()]
+    apart = own.to_absolute @ (found.point.values - own.mean)
+    after = np.diag(own.to_absolute @ found.covariance @ own.to_absolute.T)
+    taken = np.clip(1.0 - after / own.spread**2, _LEAST_SHARE, 1.0)
+    size = (np.abs(apart) / (own.spread * np.sqrt(taken)))[shared]
+    worst = int(np.argmax(size))
+    chance = len(shared) * 2.0 * float(ndtr(-size[worst]))
+    return own.names[shared[worst]], float(size[worst]), min(chance, 1.0)
 
 
 def withdraw(one: Estimate, reason: str) -> Estimate:
