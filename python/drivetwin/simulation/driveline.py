@@ -321,7 +321,10 @@ def solve_steady_speed(front: OpenConverter, torque: float, turbine: float) -> f
 
 
 def _interpolate(engine_torque: Signal, time: float) -> float:
-    return float(np.interp(time, engine_torque.arrival, engine_torque.values))
+    """Interpolate the torque at the start, without a derivative by its delay: the engine turns
+    evenly there."""
+    acting = time - float(engine_torque.delay)
+    return float(np.interp(acting, engine_torque.time, engine_torque.values))
 
 
 def _solve_acceleration(

@@ -28,7 +28,12 @@ from drivetwin.estimation.likelihood.effects.causes import (
     widen_by_rivals,
 )
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.correction import Correction, correct_fit, keep_fit
+from drivetwin.estimation.likelihood.effects.correction import (
+    CORRECTION,
+    Correction,
+    correct_fit,
+    keep_fit,
+)
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.identifiability import (
     find_at_bounds,
@@ -167,13 +172,10 @@ def build_estimates(
     corrected = widen_by_rivals(corrected, fit, cause)
     slips = find_reference_slips(fit)
     own = _fit_parameters(fit, corrected, signals, drivelines, slips)
-    sensors = None if correction is None else correct_fit(fit, priors.drop_effects())
-    if sensors is not None and sensors.step.chi2 <= EXPLAINED:
-        plain = _fit_parameters(fit, sensors, signals, drivelines, slips)
-        is_free = not is_at_bound(fit, sensors.mean.values)
-        if is_free and _is_card_likelier(plain.fitted, corrected):
-            corrected, own, predicted = sensors, plain, sensors
-            cause = find_cause(corrected, fit)
+    accused = _blame_card(fit, signals, drivelines, priors, corrected) if correction else None
+    if accused is not None:
+        corrected, own = accused
+        predicted, cause = corrected, find_cause(corrected, fit)
     fitted, values, matrix, std = own.fitted, own.values, own.jacobian, own.std
     curves = build_friction_curves(fit, corrected)
     ids = fitted.ids
@@ -328,6 +330,27 @@ def _check_levels(fit: LikelihoodFit, corrected: Correction) -> list[Finding]:
         ratio = corrected.mean[unknown]
         if abs(ratio - prior.mean[k]) > PRIOR.contradiction * std:
             found.append(report(Code.GAINS_CONTRADICT, element=name, partner=partner, ratio=ratio))
+    return found
+
+
+def _blame_card(
+    fit: LikelihoodFit,
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[KnownDriveline],
+    priors: EffectPriors,
+    corrected: Correction,
+) -> tuple[Correction, _ReportedParameters] | None:
+    """Correct the fit for the tolerances of sensors alone, if a wrong design value then explains
+    the log better than the effects of `corrected`. A single step shows that it does not."""
+    found, slips = None, find_reference_slips(fit)
+    for more_steps in (0, CORRECTION.more_steps):
+        plain = correct_fit(fit, priors.drop_effects(), more_steps)
+        if plain is None or plain.step.chi2 > EXPLAINED or is_at_bound(fit, plain.mean.values):
+            return None
+        own = _fit_parameters(fit, plain, signals, drivelines, slips)
+        if not _is_card_likelier(own.fitted, corrected):
+            return None
+        found = plain, own
     return found
 
 

@@ -352,7 +352,7 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
         """Build the run at `point` over `time` (N,) [s], driven by measured `inputs`.
 
         `added` take the place of the elements beside the dual clutch. Elements that stay open have
-        no pressure. Neither delay nor error of the engine torque carry derivatives.
+        no pressure. Errors of the engine torque carry no derivatives.
         """
         model = self.build_model(point)
         added = self.build_added_elements(point, model) if added is None else added
@@ -368,7 +368,7 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
         values = read.values
         for name, one in self.torque_errors.items():
             values = values - float(point[name]) * np.interp(read.time, one.time, one.values)
-        return Signal(read.time, values, -float(self.get_value(point, "te_delay")))
+        return Signal(read.time, values, -self.get_value(point, "te_delay"))
 
     def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
         """Return the delay [s] of each of `inputs` at `point`."""
@@ -378,14 +378,8 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
     def list_disturbances(
         self, point: ParameterVector, record: TorqueRecord
     ) -> dict[str, Disturbance]:
-        """List delay and errors of the engine torque, as far as they are unknowns.
-
-        The rate is that of the torque without noise: jitter would seem to show a delay.
-        """
+        """List the errors of the engine torque that are unknowns."""
         found = {}
-        delay = self.get_unknown("te_delay")
-        if delay in point.names:
-            found[delay] = Disturbance(ENGINE_TORQUE, record.compute_torque_rate(point[delay]))
         read = 0.5 * (record.time[1:] + record.time[:-1]) + self.get_value(point, "te_delay")
         for name, one in self.torque_errors.items():
             found[name] = Disturbance(ENGINE_TORQUE, -np.interp(read, one.time, one.values))

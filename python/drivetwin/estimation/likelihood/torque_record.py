@@ -15,8 +15,9 @@ from drivetwin.estimation.data.shift_data import ShiftSignals, TorqueOfSpeeds
 from drivetwin.likelihood.input_smoothing import (
     build_valve_windows,
     compute_bend,
-    smooth_adaptive,
+    select_windows,
     smooth_pressure,
+    smooth_windows,
 )
 from drivetwin.likelihood.output import Output
 from drivetwin.likelihood.recorded_data import (
@@ -52,8 +53,6 @@ class TorqueRecord(RecordedData):
     pressures by element.
     """
 
-    steady_torque: Signal
-    """Engine torque without its noise; its rate of change is computed from it."""
     bend: FloatArray
     """Correction of the engine-torque samples for the curvature between samples [N m]."""
     input_sigma: Mapping[str, float]
@@ -128,13 +127,6 @@ class TorqueRecord(RecordedData):
         share = csr_array(by_step @ csr_array(of_speed * slope[:, None]))
         return SharedNoise(TORQUE, ENGINE_SPEED, share)
 
-    def compute_torque_rate(self, delay: float) -> FloatArray:
-        """Compute the rate of the engine torque [N m/s] as it acts over each step of the grid
-        (N-1,)."""
-        signal = self.steady_torque
-        ends = np.interp(self.time + delay, signal.time, signal.values)
-        return np.asarray(np.diff(ends) / np.diff(self.time))
-
 
 def get_columns(run: Trajectory) -> dict[str, FloatArray]:
     """Return the comparable quantities (N,) of a run, by name of the output."""
@@ -193,8 +185,8 @@ def build_record(
     fills, torque = fills or {}, signals.engine_torque
     inputs = {TORQUE: hold_ends(Signal(torque.time, torque.values), _BEYOND)}
     inputs |= {name: Signal(p.time, p.values) for name, p in signals.pressures.items()}
-    smooth = {name: one.values for name, one in inputs.items()}
-    windows = {TORQUE: np.ones(inputs[TORQUE].time.size, dtype=np.intp)}
+    windows = {TORQUE: np.pad(select_windows(torque), 1, constant_values=1)}
+    smooth = {TORQUE: np.pad(smooth_windows(torque.values, select_windows(torque)), 1, mode="edge")}
     for name, p in signals.pressures.items():
         smooth[name] = smooth_pressure(p, fills.get(name))
         windows[name] = build_valve_windows(p.time)
@@ -208,7 +200,6 @@ def build_record(
         fast,
         fast,
         windows,
-        hold_ends(Signal(torque.time, smooth_adaptive(torque)), _BEYOND),
         np.pad(compute_bend(torque.time, torque.values), 1),
         {name: float(np.sqrt(np.mean(one**2))) for name, one in noise.items()},
         fills,

@@ -64,7 +64,7 @@ def _build_column(at: OperatingPoint, role: str, kind: str, size: float) -> Dist
     if source == TORQUE:
         values = at.engine_torque
         delay = at.term.plant.get_value(at.point, "te_delay")
-        steady = at.record.steady_torque
+        steady = at.record.engine_torque
         rate = at.compute_rate(np.interp(at.run.time + delay, steady.time, steady.values))
     else:
         signal = at.record.pressures[source]
@@ -270,6 +270,10 @@ class Relinearization:
     groups: Collection[Group] | None = None
     amounts: Mapping[EffectId, float] = field(default_factory=dict)
 
+    def has(self, group: Group) -> bool:
+        """Return whether the columns of a group are among them."""
+        return self.groups is None or group in self.groups
+
 
 _Key = tuple[Group, int]
 
@@ -308,12 +312,9 @@ def _build_shift_columns(
     at: OperatingPoint, priors: EffectPriors, again: Relinearization
 ) -> _ShiftColumns:
     """Build the columns of one shift; those that are not finite are left out."""
-    groups = again.groups
-    named = [
-        one
-        for one in _number_columns(at, priors, again.amounts)
-        if groups is None or one[0][0] in groups
-    ]
+    found = list(_build_random(at, priors, again))
+    keys = number_groups([group for group, _ in found])
+    named = list(zip(keys, (one for _, one in found), strict=True))
     amounts = np.array([_get_amount(again.amounts, key[0]) for key, _ in named])
     matrix = observe(at, [one for _, one in named]) / amounts
     for k, (key, one) in enumerate(named):
@@ -400,26 +401,23 @@ def _get_amount(amounts: Mapping[EffectId, float], group: Group) -> float:
     return 1.0 if group.effect is None else amounts.get(group.effect, 1.0)
 
 
-def _number_columns(
-    at: OperatingPoint, priors: EffectPriors, amounts: Mapping[EffectId, float]
-) -> Iterator[tuple[_Key, Disturbance]]:
-    """Yield the disturbances of one prior standard deviation with their group and number."""
-    found = list(_build_random(at, priors, amounts))
-    keys = number_groups([group for group, _ in found])
-    yield from zip(keys, (one for _, one in found), strict=True)
-
-
 def _build_random(
-    at: OperatingPoint, priors: EffectPriors, amounts: Mapping[EffectId, float]
+    at: OperatingPoint, priors: EffectPriors, again: Relinearization
 ) -> Iterator[tuple[Group, Disturbance]]:
+    """Yield the disturbances of one prior standard deviation with their group."""
+    named = None if again.groups is None else {group.effect for group in again.groups}
     for name, effect in EFFECTS.items():
         prior = priors.get_prior(name, at.term.plant.driveline)
-        if prior.std > 0.0 and not _is_in_plant(at, name):
-            size = effect.scale_amount(amounts.get(name, 1.0), prior.std)
-            for one in effect.build(at, size):
-                yield Group(name, one.subject), one
+        is_off = prior.std == 0.0 or _is_in_plant(at, name)
+        if is_off or (named is not None and name not in named):
+            continue
+        size = effect.scale_amount(again.amounts.get(name, 1.0), prior.std)
+        for one in effect.build(at, size):
+            if again.has(group := Group(name, one.subject)):
+                yield group, one
     for one in build_sensor_columns(at, priors.sensors):
-        yield Group(None, one.subject), one
+        if again.has(group := Group(None, one.subject)):
+            yield group, one
 
 
 def _is_in_plant(at: OperatingPoint, effect: EffectId) -> bool:

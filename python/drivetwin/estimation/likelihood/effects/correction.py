@@ -14,6 +14,7 @@ from drivetwin.estimation.likelihood.effects.columns import (
     EffectPriors,
     build_columns,
     compute_inputs,
+    number_groups,
 )
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.joint_step import (
@@ -99,14 +100,18 @@ class Correction:
         return self.step.residuals
 
 
-def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
+def correct_fit(
+    fit: LikelihoodFit, priors: EffectPriors, more_steps: int = CORRECTION.more_steps
+) -> Correction | None:
     """Estimate the unknowns with all effects at their priors; None without a linear response.
 
     Effects with evidence move the values. The others have a posterior mean too; it is not applied,
     and the variance grows by its square. The first step is from the minimum of the fit. Where it
     leaves the range in which the columns are linear, they are recomputed where it ends, and
-    another step is taken from there. A step holds the columns fixed while the unknowns move, so
-    that steps may shrink slowly: they are extrapolated (Anderson, Journal of the ACM 12, 1965).
+    another step is taken from there, at most `more_steps` times. A step holds the columns fixed
+    while the unknowns move, so that steps may shrink slowly: they are extrapolated (Anderson,
+    Journal of the ACM 12, 1965). Effects without evidence move nothing: their columns are
+    recomputed where the steps end.
     """
     found = expand_effects(fit, priors)
     if found is None:
@@ -114,31 +119,38 @@ def correct_fit(fit: LikelihoodFit, priors: EffectPriors) -> Correction | None:
     sums, shown, evidence = found.sums, found.shown, dict(found.evidence)
     if fit.plant is not None:
         evidence |= _describe_plant(fit, fit.plant, sums.pull.size)
-    base = _Expansion(fit.problem, fit.normal, fit.point, sums)
-    step = base.take_step(shown)
-    moves, amounts = step.moves, base.spread_amounts(step, shown)
+    base = _Expansion(fit.problem, fit.normal, fit.point, sums, None)
+    moving = base.select(shown)
+    step = moving.take_step()
+    moves, amounts = step.moves, _Amounts(moving.sums.columns, step.amounts)
     change, last, limit = moves, np.zeros_like(moves), CORRECTION.linear_moves
     answers: list[_Answer] = []
     tried: list[_Tried] = []
-    for _ in range(CORRECTION.more_steps):
+    for _ in range(more_steps):
         std = np.sqrt(np.diag(step.covariance)[: moves.size])
         if np.max(np.abs(change) / std) <= limit:
             break
         again = _expand_again(fit, moves, priors, amounts)
         if again is None:
+            tried.clear()
             last = np.full_like(moves, np.inf)
             break
-        base, step = again, again.take_step(shown)
-        end = base.point.values + step.moves - fit.point.values
-        change = last = end - moves
-        answers.append(_Answer(end, base.spread_amounts(step, shown), std, change / std))
-        tried.append(_Tried(base, change, step.chi2))
+        step = again.take_step()
+        end = again.point.values + step.moves - fit.point.values
+        change = end - moves
+        reached = _Amounts(again.sums.columns, step.amounts)
+        answers.append(_Answer(end, reached, std, change / std))
+        tried.append(_Tried(again, change, step.chi2))
         if _is_diverging(answers):
             break
         moves, amounts = _extrapolate(answers[-CORRECTION.memory - 1 :])
         limit = CORRECTION.settled
-    if tried and np.all(np.isfinite(last)):
-        base, last = _find_closest(tried, answers, (base, last))
+    if tried:
+        closest = _find_closest(tried, answers)
+        whole = _complete(fit, base, closest.base, priors)
+        base, last = (
+            (base, np.full_like(last, np.inf)) if whole is None else (whole, closest.change)
+        )
     return _conclude(fit, base, shown, last, evidence, found.sizes)
 
 
@@ -193,36 +205,38 @@ def keep_fit(fit: LikelihoodFit) -> Correction:
 
 @dataclass(frozen=True, eq=False)
 class _Expansion:
-    """Point, expansion of Q there, and the weighted sums of all columns."""
+    """Point, expansion of Q there, and the weighted sums of columns; `driving` are the amounts that
+    drive the runs, None for none."""
 
     problem: DualClutchProblem
     normal: NormalEquations
     point: ParameterVector
     sums: WeightedColumns
+    driving: _Amounts | None
 
-    def take_step(self, groups: Collection[Group] | None = None) -> JointStep:
-        """Take the joint step with the columns of some `groups`, or of all."""
-        sums = self.sums
-        if groups is not None:
-            named = enumerate(sums.columns.groups)
-            sums = sums.select([k for k, one in named if one in groups])
-        return take_joint_step(self.problem, self.normal, sums)
+    def select(self, groups: Collection[Group]) -> _Expansion:
+        """Return the expansion with the columns of some `groups`."""
+        named = enumerate(self.sums.columns.groups)
+        return replace(self, sums=self.sums.select([k for k, one in named if one in groups]))
 
-    def spread_amounts(self, step: JointStep, groups: Collection[Group]) -> _Amounts:
-        """Return the amounts of a step with the columns of `groups` among all columns."""
-        amounts = np.zeros(self.sums.pull.size)
-        amounts[[k for k, one in enumerate(self.sums.columns.groups) if one in groups]] = (
-            step.amounts
-        )
-        return _Amounts(self.sums.columns, amounts)
+    def take_step(self) -> JointStep:
+        """Take the joint step with all columns."""
+        return take_joint_step(self.problem, self.normal, self.sums)
 
 
 @dataclass(frozen=True, eq=False)
 class _Amounts:
-    """Columns of all effects with their amounts (q,); zero for effects without evidence."""
+    """Columns of effects with their amounts (q,)."""
 
     columns: EffectColumns
     values: FloatArray
+
+    def spread_over(self, columns: EffectColumns) -> _Amounts:
+        """Return the amounts among more `columns`, zero for the others."""
+        keys = number_groups(columns.groups)
+        values = np.zeros(len(keys))
+        values[[keys.index(one) for one in number_groups(self.columns.groups)]] = self.values
+        return _Amounts(columns, values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,18 +261,25 @@ class _Tried:
     chi2: float
 
 
-def _find_closest(
-    tried: Sequence[_Tried], answers: Sequence[_Answer], last: tuple[_Expansion, FloatArray]
-) -> tuple[_Expansion, FloatArray]:
-    """Return the expansion whose step comes closest to the log, where the steps did not settle.
+def _find_closest(tried: Sequence[_Tried], answers: Sequence[_Answer]) -> _Tried:
+    """Return the last step, or the one that comes closest to the log where they did not settle.
 
     Steps may leave the minimum again: an element then locks at another time, and the columns of
-    the effects are those of another motion. Without that the `last` one is returned.
+    the effects are those of another motion.
     """
     if np.max(np.abs(answers[-1].change)) <= CORRECTION.settled:
-        return last
-    closest = min(reversed(tried), key=lambda one: one.chi2)
-    return closest.base, closest.change
+        return tried[-1]
+    return min(reversed(tried), key=lambda one: one.chi2)
+
+
+def _complete(
+    fit: LikelihoodFit, first: _Expansion, base: _Expansion, priors: EffectPriors
+) -> _Expansion | None:
+    """Expand with the columns of all effects where a step with those that move values started."""
+    assert base.driving is not None, "a further step drives the runs"
+    driving = base.driving.spread_over(first.sums.columns)
+    with limit_evaluations(np.inf):
+        return _expand_with_inputs(fit.problem, base.point, priors, driving)
 
 
 def _extrapolate(answers: Sequence[_Answer]) -> tuple[FloatArray, _Amounts]:
@@ -289,7 +310,7 @@ def _conclude(
     sizes: Mapping[Group, float],
 ) -> Correction:
     """Compute values and covariances at the last expansion."""
-    step, chosen = base.take_step(), base.take_step(shown)
+    step, chosen = base.take_step(), base.select(shown).take_step()
     size = last.size
     rest = step.moves - chosen.moves
     extra = _compute_model_spread(fit)
@@ -354,7 +375,7 @@ def _expand_with_inputs(
     if normal is None or columns is None:
         return None
     sums = weight_columns(problem, normal, columns.follow(first, acting))
-    return _Expansion(problem, normal, point, sums)
+    return _Expansion(problem, normal, point, sums, amounts)
 
 
 def _compute_model_spread(fit: LikelihoodFit) -> FloatArray:

@@ -72,7 +72,7 @@ def build_torque_lag(at: OperatingPoint, std: float) -> list[Disturbance]:
     logged value lags by -τ is T·(1 - τs). The delay τ is an unknown of its own, so the change is
     (e^τs/(1 + τs) - 1)·T or ((1 - τs)·e^τs - 1)·T. To second order both are ±τ²/2·T''.
     """
-    steady = at.record.steady_torque
+    steady = at.record.engine_torque
     raster = np.arange(steady.time[0], steady.time[-1], STEP_S)
     if at.record.of_speeds is not None or raster.size < 2:
         return []
@@ -125,7 +125,7 @@ def build_torque_map(at: OperatingPoint, std: float) -> list[Disturbance]:
     Its part in proportion to the torque is a gain error, a constant part is drag at the input: both
     have entries of their own, and a torque that hardly varies shows no other part.
     """
-    steady = at.record.steady_torque
+    steady = at.record.engine_torque
     delay = at.term.plant.get_value(at.point, "te_delay")
     torque = np.interp(at.middle + delay, steady.time, steady.values)
     share = np.abs(torque) / at.largest_engine_torque
