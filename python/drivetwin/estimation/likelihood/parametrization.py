@@ -101,7 +101,7 @@ PLANTS: Mapping[EffectId, PlantRow] = {
             MODE_DAMPING: exp(own[2]),
         },
         {"share": PriorValue(0.5, 0.12), "ln_damping": PriorValue(log(0.05), 0.5)},
-        starts=(-1.0, 0.0),
+        starts=(0.0, -1.0),
         spread=0.5,
     ),
     EffectId.BACKLASH: PlantRow(
