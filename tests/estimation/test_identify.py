@@ -280,6 +280,8 @@ def _check_efficiency_from_design(found: Identification, card: VehicleCard) -> N
     ratio = values["J_vehicle_over_eta"]
     assert ratio.value is not None
     assert values["J_vehicle"].value == pytest.approx(0.9 * ratio.value)
-    assert values["J_vehicle"].std_systematic == pytest.approx(0.02 * ratio.value, rel=1e-5)
+    assert ratio.std_total is not None
+    both = np.hypot(0.02 * ratio.value, 0.9 * ratio.std_total)
+    assert values["J_vehicle"].std_total == pytest.approx(both, rel=1e-6)
     assert values["J_vehicle"].method == WITH_ETA
     assert values["eta"].verdict is Verdict.DESIGN

@@ -166,7 +166,7 @@ def test_the_slower_torque_is_the_lagged_faster_one(size: float, at: Any) -> Non
 
     Both are without the delay, which is an unknown of its own.
     """
-    steady, time = at.record.steady_torque, at.middle
+    steady, time = at.record.engine_torque, at.middle
     age = at.term.plant.get_value(at.point, "te_delay")
     fine = np.arange(time[0], time[-1], 2e-4)
     logged = np.interp(fine + age, steady.time, steady.values)
