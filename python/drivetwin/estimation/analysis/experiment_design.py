@@ -79,7 +79,7 @@ class BaseShift:
     @property
     def largest(self) -> float:
         """Largest engine torque of the log [N m]."""
-        return float(np.max(np.abs(self.record.steady_torque.values)))
+        return float(np.max(np.abs(self.record.engine_torque.values)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,11 +176,9 @@ def _replace_torque(
     record: TorqueRecord, change: Callable[[FloatArray, FloatArray], FloatArray]
 ) -> TorqueRecord:
     """Change the engine torque by a function of time [s] and torque [N m]."""
-    torque, steady = (
-        Signal(signal.time, change(signal.time, signal.values))
-        for signal in (record.engine_torque, record.steady_torque)
-    )
-    return replace(record, inputs={**record.inputs, TORQUE: torque}, steady_torque=steady)
+    read = record.engine_torque
+    torque = Signal(read.time, change(read.time, read.values))
+    return replace(record, inputs={**record.inputs, TORQUE: torque})
 
 
 def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> TorqueRecord:
@@ -209,7 +207,6 @@ def _build_gear_record(base: BaseShift, demand: Signal, length: float) -> Torque
         nothing,
         nothing,
         {name: np.ones(none.size, dtype=np.intp) for name, none in nothing.items()},
-        torque,
         nothing[TORQUE],
         record.input_sigma,
     )

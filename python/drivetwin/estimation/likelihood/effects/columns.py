@@ -313,8 +313,8 @@ def _build_shift_columns(
 ) -> _ShiftColumns:
     """Build the columns of one shift; those that are not finite are left out."""
     found = list(_build_random(at, priors, again))
-    keys = number_groups([group for group, _ in found])
-    named = list(zip(keys, (one for _, one in found), strict=True))
+    numbered = number_groups([group for group, _ in found])
+    named = list(zip(numbered, (one for _, one in found), strict=True))
     amounts = np.array([_get_amount(again.amounts, key[0]) for key, _ in named])
     matrix = observe(at, [one for _, one in named]) / amounts
     for k, (key, one) in enumerate(named):
