@@ -48,6 +48,8 @@ from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.verdict import VERDICT, assess, is_limited
 from drivetwin.findings import Code, explain
 from drivetwin.likelihood.covariance import invert_information, reduce_information
+from drivetwin.likelihood.input_smoothing import smooth_adaptive
+from drivetwin.likelihood.measured_signal import MeasuredSignal
 from drivetwin.likelihood.output import Output
 from drivetwin.likelihood.point import ParameterVector
 from drivetwin.likelihood.recorded_data import RECORD
@@ -323,7 +325,8 @@ def _compute_gains(
 ) -> list[_InformationGain]:
     """Compute the information of each experiment on shift k; failed simulations are left out."""
     point = _add_delay(fit)
-    base = BaseShift(fit.problem.terms[k], point, signals[k].shift.lockup_time)
+    term = _steady_torque(fit.problem.terms[k], signals[k].engine_torque)
+    base = BaseShift(term, point, signals[k].shift.lockup_time)
     names = [one.shift.name for one in signals]
     label = names[k] if len(set(names)) > 1 else ""
     found = []
@@ -333,6 +336,13 @@ def _compute_gains(
         if gain is not None:
             found.append(gain)
     return found
+
+
+def _steady_torque(term: DualClutchTerm, read: MeasuredSignal) -> DualClutchTerm:
+    """Take the noise off the engine torque: jitter of one that rests would seem to show a delay."""
+    steady = np.interp(term.record.engine_torque.time, read.time, smooth_adaptive(read))
+    record = _replace_torque(term.record, lambda _, __: steady)
+    return replace(term, record=record)
 
 
 def _get_delay_name(fit: LikelihoodFit) -> str:
