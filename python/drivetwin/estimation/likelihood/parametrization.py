@@ -316,7 +316,7 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
         if found.tyre is None:
             return found
         speed = abs(float(point[f"{self.label}.{START[1]}"]))
-        return replace(found, tyre=found.tyre.linearise(speed))
+        return replace(found, tyre=replace(found.tyre, speed=speed))
 
     def _build_load(self, point: ParameterVector) -> RoadLoad:
         aero = self.get_value(point, AERO)
