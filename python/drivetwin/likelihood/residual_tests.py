@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Residual tests: whiteness, correlation with the inputs, and orders of a shaft.
 
-Q per sample hardly notices a wrong model, since the error is slow and the noise is not. Averages over blocks show it: white noise leaves 1/m of
-its power in means over m samples.
+Q per sample hardly notices a wrong model, since the error is slow and the noise is not. Averages
+over blocks show it: white noise leaves 1/m of its power in means over m samples.
 """
 
 from __future__ import annotations
