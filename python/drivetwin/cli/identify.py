@@ -10,7 +10,7 @@ from pathlib import Path
 
 from drivetwin._util.progress import TimedStages, scale_progress
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.cli.input_files import find_mapping
+from drivetwin.cli.input_files import find_logs, find_mapping
 from drivetwin.cli.options import (
     REPORT,
     RESULT,
@@ -185,8 +185,3 @@ def _parse_shift(text: str, logs: Sequence[Path]) -> tuple[int, int | None]:
             Where(key="--hold-out"),
         )
     return places[0], int(number)
-
-
-def find_logs(name: str, logs: Sequence[Path]) -> list[int]:
-    """Find the places of the logs of a name, with or without folder and ending."""
-    return [k for k, log in enumerate(logs) if name in (str(log), log.name, log.stem)]

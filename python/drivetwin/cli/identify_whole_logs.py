@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.cli.identify import find_logs
-from drivetwin.cli.input_files import find_mapping
+from drivetwin.cli.input_files import find_logs, find_mapping
 from drivetwin.cli.options import (
     BUS_RESULT,
     REPORT,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,11 @@ from drivetwin.logs.raw import HEAD_BYTES
 from drivetwin.logs.read import read_log
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.card import VehicleCard, load_card
+
+
+def find_logs(name: str, logs: Sequence[Path]) -> list[int]:
+    """Find the places of the logs of a name, with or without folder and ending."""
+    return [k for k, log in enumerate(logs) if name in (str(log), log.name, log.stem)]
 
 
 def find_mapping(channels: Path | None, log: Path) -> Mapped:
