@@ -16,8 +16,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.likelihood.motion import simulate_motion
 from drivetwin.estimation.likelihood.parametrization import DualClutchTerm
 from drivetwin.likelihood.output import IndexArray
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.simulation.dual_clutch import Signal
 from tests.support.bench import Bench
 

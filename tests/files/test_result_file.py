@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from drivetwin.errors import ResultFileError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.files.result_file import ResultFile, load_result, save_result
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from tests.report.sample import identification
 
 

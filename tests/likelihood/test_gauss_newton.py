@@ -14,8 +14,7 @@ from scipy.optimize import lsq_linear
 
 from drivetwin.estimation.likelihood.parametrization import DualClutchProblem
 from drivetwin.likelihood.gauss_newton import GAUSS_NEWTON, minimise
-from drivetwin.likelihood.point import NormalEquations, ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import NormalEquations, ParameterVector, Prior
 from tests.support.arrays import FloatArray
 
 NAMES = ("a", "b", "c")

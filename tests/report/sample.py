@@ -14,7 +14,7 @@ from drivetwin.estimation.result.estimate import Estimate, FrictionCurve, Verdic
 from drivetwin.estimation.result.method import Method
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.findings import Code, report
-from drivetwin.likelihood.signal_fit import compute_fit
+from drivetwin.likelihood.output import compute_fit
 from drivetwin.report.html import build_report_sections
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.simulation.dual_clutch import Event, Signal, Stribeck, Trajectory

@@ -13,7 +13,7 @@ from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code, Finding, explain, report
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.report.summary import build_fit_table
 from tests.files.test_twin_file import ACTUATOR
 from tests.report.sample import build_section, identification, list_blocks, simulated, validation

@@ -13,7 +13,7 @@ from drivetwin.estimation.result.cause import PredictedSpread
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code, report
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.validation.gate import assess_model
 from drivetwin.vehicle.spec import PriorValue
 from tests.report.sample import TIME, identification, validation

@@ -25,8 +25,7 @@ from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
 from drivetwin.likelihood.measured_signal import count_repeats
 from drivetwin.likelihood.objective import LikelihoodObjective
 from drivetwin.likelihood.output import ComparedOutputs, Output
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.likelihood.residual_covariance import Whitener, build_sensor_whitener
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.spec import PriorValue

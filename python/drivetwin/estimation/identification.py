@@ -28,7 +28,7 @@ from drivetwin.estimation.result.estimate_set import JointCovariance
 from drivetwin.estimation.result.method import Method, ModelStatus
 from drivetwin.estimation.result.verdict import adopt_verdicts
 from drivetwin.findings import Code, Finding, report
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.shifts.shift import RejectedShift, Shift
 
 if TYPE_CHECKING:

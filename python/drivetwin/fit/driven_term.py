@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
-from drivetwin.fit.input_path import InputPath
 from drivetwin.fit.plant import Plant
 from drivetwin.likelihood.objective import LikelihoodObjective
 from drivetwin.likelihood.output import ComparedOutputs
@@ -87,6 +86,15 @@ def _integrate(time: FloatArray, column: FloatArray, at: FloatArray) -> FloatArr
     early = np.minimum(at - time[0], 0.0).reshape(inside.shape)
     within = inside * (column[piece] + 0.5 * inside * slope)
     return np.asarray(whole[piece] + within + early * column[:1])
+
+
+@dataclass(frozen=True, eq=False)
+class InputPath:
+    """Input as a function of the unknowns `of`: `compute` of their values returns it (N,) on the
+    grid of the run."""
+
+    of: tuple[str, ...]
+    compute: Callable[..., FloatArray]
 
 
 @dataclass(frozen=True, eq=False)

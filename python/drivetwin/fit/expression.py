@@ -28,8 +28,7 @@ from drivetwin.fit.unknown import (
     require_sound,
     resolve_unknown,
 )
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.simulation.variable import Variable
 
 

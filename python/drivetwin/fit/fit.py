@@ -23,10 +23,9 @@ from drivetwin.fit.search import search
 from drivetwin.fit.starts import drop_redundant_speeds, guess_start
 from drivetwin.likelihood.gauss_newton import minimise
 from drivetwin.likelihood.objective import LikelihoodObjective
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.output import SignalFit
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.likelihood.recorded_data import RecordedData
-from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.simulation.element_schema import (
     GROUND,
     find_element_faults,

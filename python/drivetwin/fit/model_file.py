@@ -27,7 +27,7 @@ from drivetwin.errors import InputError, Where, suggest_spelling
 from drivetwin.fit.expression import Expression
 from drivetwin.fit.fixed_numbers import Tolerance, list_fixed
 from drivetwin.fit.network_model import NetworkModel
-from drivetwin.fit.quantities import to_output
+from drivetwin.fit.places import to_output
 from drivetwin.fit.recording import Samples
 from drivetwin.fit.unknown import Unknown
 from drivetwin.simulation.element_schema import (

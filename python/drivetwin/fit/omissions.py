@@ -22,9 +22,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import Quantity
 from drivetwin.estimation.result.cause import EXPLAINED
 from drivetwin.fit.fixed_numbers import FixedNumber, Source
-from drivetwin.fit.places import list_places
+from drivetwin.fit.places import find_input_quantity, list_places
 from drivetwin.fit.plant import NetworkTerm, Problem
-from drivetwin.fit.quantities import find_input_quantity
 from drivetwin.fit.release import extend
 from drivetwin.fit.unknown import ASCII_UNITS
 from drivetwin.likelihood.column_products import adjust_unknowns, weigh_amounts

@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""Numbers of a network and of its channels by path: the places at which coordinates act."""
+"""Numbers of a network and of its channels by path, and quantities of inputs and outputs."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast, get_args
 
 from drivetwin.channels.roles import Quantity
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.fit.number_kinds import USUAL, UsualDeviation, get_usual_beside
-from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
-from drivetwin.simulation.element_schema import ELEMENT_FIELDS, FieldKind, Limit, is_number
+from drivetwin.simulation.element_schema import (
+    ELEMENT_FIELDS,
+    FieldKind,
+    Limit,
+    is_number,
+    list_inputs,
+)
 from drivetwin.simulation.element_schema import Field as ElementField
-from drivetwin.simulation.network import Output, Start
+from drivetwin.simulation.network import Output, OutputKind, Start
 
 Keys = tuple[int | str, ...]
 """Keys that lead to a number of a run: `elements`, `speeds`, `twists`, `levels` of
@@ -186,3 +191,42 @@ def _iterate_cells(value: Any) -> Iterator[tuple[Keys, float]]:
             yield from (((k, *keys), number) for keys, number in _iterate_cells(each))
     elif is_number(value):
         yield (), value
+
+
+_OF_INPUTS = {
+    "torque": Quantity.TORQUE,
+    "prescribed_speed": Quantity.SPEED,
+    "engine_map": Quantity.FRACTION,
+}
+"""Quantities of the inputs of elements; those of all others are pressures."""
+_OF_OUTPUTS = {
+    **dict.fromkeys(("speed", "slip"), Quantity.SPEED),
+    **dict.fromkeys(("shaft_torque", "torque", "friction_torque"), Quantity.TORQUE),
+}
+"""Quantities of compared outputs by kind; others are numbers in SI."""
+
+
+def find_input_quantity(name: str, elements: Sequence[Mapping[str, Any]]) -> Quantity:
+    """Return the quantity of an input by the element that takes it."""
+    for element in elements:
+        if name in list_inputs(element):
+            return _OF_INPUTS.get(str(element["type"]), Quantity.PRESSURE)
+    return Quantity.STATE
+
+
+def to_output(quantity: Sequence[str]) -> Output:
+    """Return a kind and a name as an output of a network.
+
+    Raises InputError for a kind that does not exist.
+    """
+    kind, name = quantity
+    kinds = get_args(OutputKind)
+    if kind not in kinds:
+        hint = suggest_spelling(kind, kinds)
+        raise InputError(f"{kind!r} is no quantity{hint}", f"known are {', '.join(kinds)}")
+    return (cast(OutputKind, kind), name)
+
+
+def get_output_quantity(output: Output) -> Quantity:
+    """Return the quantity of an output; `state` for one without a unit table."""
+    return _OF_OUTPUTS.get(output[0], Quantity.STATE)

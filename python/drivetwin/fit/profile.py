@@ -18,7 +18,7 @@ from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.plant import Problem
 from drivetwin.likelihood.covariance import invert_information
 from drivetwin.likelihood.gauss_newton import OptimizeResult
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import Prior
 from drivetwin.likelihood.profile import (
     PROFILE,
     HeldParameter,

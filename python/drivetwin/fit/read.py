@@ -15,7 +15,7 @@ from drivetwin.errors import MappingError, MissingChannelError, Where
 from drivetwin.findings import Finding
 from drivetwin.fit.model_file import ModelChannels
 from drivetwin.fit.network_model import NetworkModel
-from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
+from drivetwin.fit.places import find_input_quantity, get_output_quantity
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.likelihood.measured_signal import prepare_signal
 from drivetwin.logs.formats.detect import open_recording, open_stated

@@ -39,10 +39,10 @@ from drivetwin.fit.unknown import PlacedNumber, SoughtNumber
 from drivetwin.likelihood.coloured_noise import split_whitened
 from drivetwin.likelihood.covariance import compute_covariance, report_null_directions
 from drivetwin.likelihood.gauss_newton import OptimizeResult
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.likelihood.point import NormalEquations, ParameterVector
 from drivetwin.likelihood.residual_tests import check_residuals, check_weighting, find_order
 from drivetwin.likelihood.search import RefinedStart
-from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.simulation.network import NetworkRun, Output, simulate
 from drivetwin.vehicle.spec import PriorValue
 

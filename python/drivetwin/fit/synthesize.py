@@ -18,8 +18,8 @@ from drivetwin.channels.units import find_unit
 from drivetwin.errors import InputError, SimulationError
 from drivetwin.fit.model_file import ModelChannels, format_model, read_model
 from drivetwin.fit.network_model import NetworkModel
+from drivetwin.fit.places import find_input_quantity, get_output_quantity
 from drivetwin.fit.plant import Plant
-from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.recording import Samples
 from drivetwin.fit.unknown import get_factors
 from drivetwin.likelihood.point import ParameterVector

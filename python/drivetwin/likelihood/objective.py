@@ -33,10 +33,10 @@ from drivetwin.likelihood.output import Output
 from drivetwin.likelihood.point import (
     NormalEquations,
     ParameterVector,
+    Prior,
     find_acting,
     place_columns,
 )
-from drivetwin.likelihood.prior import Prior
 from drivetwin.likelihood.residual_covariance import Whitener
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.vehicle.spec import PriorValue

@@ -12,7 +12,7 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.likelihood.objective import OBJECTIVE
-from drivetwin.likelihood.output import Channel, Output
+from drivetwin.likelihood.output import Channel, Output, SignalFit, compute_fit
 from drivetwin.likelihood.point import ParameterVector
 from drivetwin.likelihood.recorded_data import RecordedData
 from drivetwin.likelihood.residual_covariance import (
@@ -24,7 +24,6 @@ from drivetwin.likelihood.residual_covariance import (
     build_sensor_whitener,
     compute_quiet_noise,
 )
-from drivetwin.likelihood.signal_fit import SignalFit, compute_fit
 from drivetwin.simulation import network
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import NetworkRun, build_element

@@ -19,7 +19,7 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import DrivetwinError
 from drivetwin.estimation.result.estimate import Estimate, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.report.blocks import (
     Block,
     Cell,

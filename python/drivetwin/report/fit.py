@@ -18,11 +18,11 @@ from drivetwin.estimation.result.estimate import Z95
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Finding
 from drivetwin.fit.fit import HeldOut
+from drivetwin.fit.places import find_input_quantity, get_output_quantity
 from drivetwin.fit.plant import NetworkTerm
-from drivetwin.fit.quantities import find_input_quantity, get_output_quantity
 from drivetwin.fit.result import ModelFit, MovedNumber
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.signal_fit import SignalFit
 from drivetwin.report.blocks import (
     Block,
     Cell,

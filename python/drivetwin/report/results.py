@@ -21,7 +21,7 @@ from drivetwin.files.records import FitRecord, ParameterRecord, Record, read_rec
 from drivetwin.files.result_file import RESULT_SCHEMA, ResultFile
 from drivetwin.files.twin_file import load_twin
 from drivetwin.fit.network_model import NetworkModel
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.parameters import ParameterSpec
 from drivetwin.report.blocks import VerdictBlock
 from drivetwin.report.bus import explain_bus, explain_tcu

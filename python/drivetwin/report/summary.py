@@ -28,7 +28,7 @@ from drivetwin.estimation.identification import OIL_TEMPERATURE, Identification
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.estimation.result.validation import Validation
 from drivetwin.findings import render
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.report.blocks import (
     Block,
     Cell,

@@ -13,8 +13,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.fit.driven_term import DrivenProblem
 from drivetwin.likelihood.gauss_newton import GaussNewtonSettings, minimise
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.identify import TcuTwin
 from drivetwin.tcu.log import SPEEDS, ControllerShift

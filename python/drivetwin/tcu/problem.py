@@ -13,8 +13,7 @@ from drivetwin.channels.units import RPM
 from drivetwin.fit.driven_term import DrivenProblem
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.likelihood.measured_signal import count_repeats
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.log import SPEEDS, ControllerShift
 from drivetwin.tcu.plant import build_term

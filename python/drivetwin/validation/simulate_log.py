@@ -17,7 +17,7 @@ from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.findings import Code, Finding, report
-from drivetwin.likelihood.signal_fit import SignalFit, compute_fit
+from drivetwin.likelihood.output import SignalFit, compute_fit
 from drivetwin.shifts.detect import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
 from drivetwin.shifts.shift import Shift, compute_exclusive_masks, get_shift_pressures

@@ -15,7 +15,7 @@ from drivetwin.estimation.regression.errors_in_variables import (
     solve,
 )
 from drivetwin.estimation.regression.modulating_functions import Quadrature
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import Prior
 from tests.support.arrays import FloatArray
 from tests.support.coverage import assert_covers, vary_draws
 

@@ -36,8 +36,7 @@ from drivetwin.estimation.likelihood.torque_record import TorqueRecord, build_re
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.likelihood.gauss_newton import solve_step
-from drivetwin.likelihood.point import NormalEquations, ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import NormalEquations, ParameterVector, Prior
 from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.simulation.dual_clutch import FrictionTable, ShiftElement, Stribeck
 

@@ -36,7 +36,7 @@ from drivetwin.estimation.regression.modulating_functions import (
     join_windows,
 )
 from drivetwin.likelihood.measured_signal import MeasuredSignal
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import Prior
 from drivetwin.shifts.detect import split_at_gaps
 from drivetwin.shifts.shift import RejectedShift, Shift
 

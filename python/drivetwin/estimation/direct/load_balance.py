@@ -23,7 +23,7 @@ from drivetwin.estimation.data.select_shifts import (
 from drivetwin.estimation.data.shift_data import ShiftSignals
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.likelihood.measured_signal import MeasuredSignal
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import Prior
 
 WINDOW = 0.01
 """Averaging window of speeds and torques [s], that of the paper's procedure."""

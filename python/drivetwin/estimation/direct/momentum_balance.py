@@ -45,7 +45,7 @@ from drivetwin.estimation.regression.modulating_functions import (
 )
 from drivetwin.findings import Code, Number, report
 from drivetwin.likelihood.measured_signal import estimate_quantization_error
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import Prior
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue, compute_middle
 

@@ -34,8 +34,8 @@ from drivetwin.estimation.likelihood.effects.correction import (
     correct_fit,
     keep_fit,
 )
-from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.identifiability import (
+from drivetwin.estimation.likelihood.fit import (
+    LikelihoodFit,
     find_at_bounds,
     find_null_directions,
     is_at_bound,

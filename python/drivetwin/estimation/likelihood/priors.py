@@ -45,8 +45,7 @@ from drivetwin.estimation.likelihood.parametrization import (
 from drivetwin.estimation.likelihood.torque_record import build_record
 from drivetwin.likelihood.input_smoothing import smooth_adaptive
 from drivetwin.likelihood.measured_signal import MeasuredSignal, estimate_quantization_error
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.likelihood.recorded_data import RECORD
 from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio

@@ -38,7 +38,7 @@ from drivetwin.estimation.result.estimate_set import EstimateSet
 from drivetwin.estimation.result.verdict import compute_covariance_root, join_reasons
 from drivetwin.findings import Code, explain
 from drivetwin.likelihood.covariance import invert_information, reduce_information
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import Prior
 
 
 def apply_consistency(joint: EstimateSet, tested: Consistency) -> EstimateSet:

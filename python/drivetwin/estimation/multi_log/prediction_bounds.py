@@ -39,8 +39,7 @@ from drivetwin.estimation.result.validation import PredictionInterval
 from drivetwin.estimation.result.verdict import compute_covariance_root
 from drivetwin.likelihood.covariance import invert_information
 from drivetwin.likelihood.gauss_newton import minimise
-from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.simulation.dual_clutch import State
 

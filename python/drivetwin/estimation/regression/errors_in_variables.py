@@ -26,8 +26,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.regression.modulating_functions import Quadrature
 from drivetwin.likelihood.gauss_newton import minimise_with_line_search
-from drivetwin.likelihood.point import NormalEquations, ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import NormalEquations, ParameterVector, Prior
 
 NUGGET = 1e-9
 """Added to S relative to its diagonal: strongly overlapping windows are nearly dependent."""

@@ -12,7 +12,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.display_units import DisplayMixin
 from drivetwin.estimation.result.estimate import Estimate
 from drivetwin.findings import Finding
-from drivetwin.likelihood.signal_fit import SignalFit
+from drivetwin.likelihood.output import SignalFit
 from drivetwin.shifts.shift import Shift
 from drivetwin.simulation.dual_clutch import DualClutch, Signal, Trajectory
 

@@ -19,8 +19,7 @@ from drivetwin.estimation.likelihood.effects.correction import Correction
 from drivetwin.estimation.likelihood.effects.effect import Effect
 from drivetwin.estimation.likelihood.effects.joint_step import GroupEvidence
 from drivetwin.estimation.likelihood.effects.table import EFFECTS, describe_group
-from drivetwin.estimation.likelihood.fit import LikelihoodFit
-from drivetwin.estimation.likelihood.identifiability import locate_bounds
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, locate_bounds
 from drivetwin.estimation.result.cause import EXPLAINED, LEAD, Cause, Group
 from drivetwin.estimation.result.estimate import Z95
 from drivetwin.findings import Code, Finding, report

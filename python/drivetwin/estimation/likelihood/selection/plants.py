@@ -31,8 +31,7 @@ from drivetwin.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_ev
 from drivetwin.likelihood.covariance import compute_covariance
 from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
 from drivetwin.likelihood.objective import LikelihoodObjective
-from drivetwin.likelihood.point import NormalEquations, ParameterVector
-from drivetwin.likelihood.prior import Prior
+from drivetwin.likelihood.point import NormalEquations, ParameterVector, Prior
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
 

@@ -22,8 +22,7 @@ from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.shaft import ROUNDING
-from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence
-from drivetwin.estimation.likelihood.identifiability import locate_bounds
+from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence, locate_bounds
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.multistart import (
     MULTI_START,
