@@ -20,7 +20,6 @@ from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.estimates import build_estimates
 from drivetwin.estimation.likelihood.mechanism import quick
 from drivetwin.estimation.likelihood.uncertainty.torque_scale import WITH_ETA
-from drivetwin.estimation.paper.pipeline import PaperShift
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import Method, ModelStatus
 from drivetwin.findings import Code
@@ -150,7 +149,6 @@ def test_a_log_with_throttle_steps_tells_everything() -> None:
     assert found.correlation is not None
     assert found.correlation.shape == (len(found.correlation_ids),) * 2
     assert get_likelihood_fit(found)[0].chi2 == pytest.approx(1.0, abs=0.05)
-    assert isinstance(found.evidence.paper[0], PaperShift)
 
 
 def test_the_papers_method_claims_no_interval_and_doubts_the_constant_torque() -> None:

@@ -61,6 +61,12 @@ def made(request: pytest.FixtureRequest) -> Made:
     return found
 
 
+@pytest.fixture(autouse=True)
+def work_in_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page without -o is written to the working folder, which other tests share."""
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.mark.parametrize("made", KINDS, indirect=True)
 def test_every_command_goes_on_with_a_result_or_states_why_not(
     made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
