@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count
 
 import numpy as np
 
@@ -181,18 +180,15 @@ def _search(basis: Basis) -> Iterator[tuple[EffectId, Refit]]:
     A further start is tried where that before ended at none: logs with a mode of 15 to 90 Hz have
     the same minimum from both.
     """
-    plans = {effect: _propose_plant(effect, basis) for effect in PLANTS}
-    total = sum(map(len, plans.values()))
-    stages, numbers = _STAGES.repeat("refit", total - 1), count()
-    for effect, searches in plans.items():
-        for search in searches:
-            number = next(numbers)
-            name = "refit" if number else "first refit"
-            with stages.enter(name, number=max(number - 1, 0)):
-                found = search()
-            if found is not None:
-                yield effect, found
-                break
+    plans = {effect: own for effect in PLANTS if (own := _propose_plant(effect, basis))}
+    stages = _STAGES.repeat("refit", len(plans) - 1)
+    for number, (effect, searches) in enumerate(plans.items()):
+        name = "refit" if number else "first refit"
+        with stages.enter(name, number=max(number - 1, 0)):
+            refits = (search() for search in searches)
+            found = next((one for one in refits if one is not None), None)
+        if found is not None:
+            yield effect, found
 
 
 def _propose_plant(effect: EffectId, basis: Basis) -> list[Callable[[], Refit | None]]:
