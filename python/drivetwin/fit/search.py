@@ -36,8 +36,6 @@ class FitSearchSettings:
 
     points: int = 800
     """Points of the grid on the way to the minimum, about [count]."""
-    accept_chi2: float = 1.05
-    """Q per sample, beyond its own scatter, up to which a minimum explains the recordings [-]."""
     work: float = 1500.0
     """Work of all starts: 3 to 8 times that of the starts of a recording that the model explains
     [passes]."""
@@ -136,8 +134,9 @@ def _coarsen(problem: Problem) -> Problem:
 
 
 def _is_explained(chi2: float, size: int) -> bool:
-    """Return whether Q per sample is about 1, for so many samples."""
-    return chi2 < FIT_SEARCH.accept_chi2 + 3.0 * float(np.sqrt(2.0 / size))
+    """Return whether Q per sample is 1 within its scatter, for so many samples: a wrong minimum may
+    be no more than 3 % above it."""
+    return chi2 < 1.0 + 3.0 * float(np.sqrt(2.0 / size))
 
 
 def _polish(problem: Problem, point: ParameterVector) -> OptimizeResult[Problem]:
