@@ -96,3 +96,10 @@ def test_every_test_of_the_lists_exists() -> None:
     assert len(listed) > 50
     for path, name in listed:
         assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8"), (path, name)
+
+
+def test_the_reference_of_python_has_each_module_once() -> None:
+    page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    modules = re.findall(r"automodule:: (\S+)", page)
+    assert len(modules) > 20
+    assert sorted(set(modules)) == sorted(modules)
