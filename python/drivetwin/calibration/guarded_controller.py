@@ -18,7 +18,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, NoReturn
 
-from drivetwin._util.optional_dependencies import describe_end
+from drivetwin._util.child_process import describe_end
 from drivetwin._util.progress import attach_listener, notify_progress
 from drivetwin.errors import ControllerError, Where
 from drivetwin.simulation.driveline_run import Call, create_trace, read_calls

@@ -229,7 +229,7 @@ class Maneuver:
             return self
         rate = self.compute_acceleration(self.point.engine_torque, self.ratios[0]) / self.model.i_f
         linear = tyre.linearise(self.start.speeds[VEHICLE] + 0.5 * self.horizon * rate)
-        return replace(self, added=replace(self.added, tyre=linear))
+        return replace(self, added=replace(self.added, tyre=linear.drop_fast_rim()))
 
     def set_step(self, step: float) -> Maneuver:
         """Return the shift with another sampling step [s]."""

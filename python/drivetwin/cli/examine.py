@@ -22,10 +22,10 @@ from drivetwin.cli.requests.identification import Examine, Fit, IdentifyOptions
 from drivetwin.errors import InputError
 from drivetwin.estimation.analysis.experiment_design import compute_rankings
 from drivetwin.estimation.analysis.friction_shape import fit_friction_shape
-from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.analysis.profile_likelihood import compute_profile
 from drivetwin.estimation.data.prepare import collect_tolerances
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
+from drivetwin.estimation.result.method import FrictionShape
 from drivetwin.files.result_file import (
     format_friction,
     format_profile,

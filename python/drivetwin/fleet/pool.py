@@ -21,13 +21,13 @@ from time import monotonic
 from typing import IO, Any
 from uuid import uuid4
 
-from drivetwin._util.optional_dependencies import (
+from drivetwin._util.child_process import (
     BY_ITSELF,
     GRACE,
     describe_end,
     end_process,
-    import_extra,
 )
+from drivetwin._util.optional_dependencies import import_extra
 from drivetwin.errors import SchedulerError, Where
 from drivetwin.fleet.task import (
     Aborted,

@@ -19,7 +19,8 @@ from queue import SimpleQueue
 from time import perf_counter
 from typing import Any
 
-from drivetwin._util.optional_dependencies import get_program_version, limit_memory
+from drivetwin._util.child_process import limit_memory
+from drivetwin._util.optional_dependencies import get_program_version
 from drivetwin.errors import DrivetwinError, StoreError
 from drivetwin.fleet.parts import convert_write_errors, write_part
 from drivetwin.fleet.task import Found, Outcome, State, Task, make_memory_outcome

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, Self, TypeVar
@@ -40,7 +41,7 @@ class Disturbance(NamedTuple):
     change: FloatArray
 
 
-class RecordedPlant(Generic[R]):
+class RecordedPlant(ABC, Generic[R]):
     """Network of a recording as a function of the unknowns.
 
     `label` is the name of the recording among several, `outputs` are those of the network by the
@@ -50,15 +51,15 @@ class RecordedPlant(Generic[R]):
     label: str
     outputs: Mapping[str, network.Output]
 
+    @abstractmethod
     def build_task(
         self, point: ParameterVector, inputs: Mapping[str, Signal], time: FloatArray
     ) -> NetworkTask:
         """Build the run at `point`, driven by measured `inputs` over the grid `time` (N,) [s]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
         """Return the delay [s] of each of `inputs` at `point`."""
-        raise NotImplementedError
 
     def get_gains(self, point: ParameterVector) -> dict[str, float]:
         """Return the gain of each measured input, 1 without an entry."""
@@ -88,8 +89,11 @@ class RecordedPlant(Generic[R]):
         return name
 
     def get_step(self, name: str) -> float:
-        """Return the step of a coordinate for a difference of runs."""
-        raise NotImplementedError(name)
+        """Return the step of a coordinate for a difference of runs.
+
+        Only the coordinates of `list_undifferentiated` need one.
+        """
+        raise AssertionError(f"the core differentiates by {name}")
 
 
 P = TypeVar("P", bound=RecordedPlant[Any])

@@ -115,6 +115,8 @@ class OpenConverter:
     engine_inertia: float
 
 
+LEAST_SPEED = 0.5
+"""Speed of the vehicle at the wheel [rad/s] below which a tyre is a damper."""
 _FAST_RIM = 2e-3
 """Lag [s] of a rim behind a linear tyre below which it is left out: the span of the central
 differences by which jerk is computed."""
@@ -137,12 +139,17 @@ class TyreSlip:
         return cls(torque / slip, RIM_SHARE * vehicle_inertia)
 
     def linearise(self, speed: float) -> TyreSlip:
-        """Return the damper about a speed of the vehicle at the wheel [rad/s], without a fast rim.
+        """Return the damper about a speed of the vehicle at the wheel [rad/s].
 
         A run passes it several times as fast as the exact law.
         """
-        lag = self.rim_inertia * speed / self.slip_stiffness
-        return TyreSlip(self.slip_stiffness, self.rim_inertia * (lag > _FAST_RIM), speed)
+        return replace(self, speed=max(abs(speed), LEAST_SPEED))
+
+    def drop_fast_rim(self) -> TyreSlip:
+        """Return the damper without its rim where that follows the wheel at once."""
+        assert self.speed is not None, "the tyre is linear"
+        lag = self.rim_inertia * self.speed / self.slip_stiffness
+        return replace(self, rim_inertia=self.rim_inertia * (lag > _FAST_RIM))
 
     def share_form(self, other: TyreSlip | None) -> TyreSlip:
         """Return the tyre exact, or linear with or without a rim, as `other` is."""

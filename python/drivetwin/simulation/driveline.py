@@ -16,6 +16,7 @@ import numpy as np
 
 from drivetwin.errors import InputError
 from drivetwin.simulation.added_elements import (
+    LEAST_SPEED,
     NO_ADDED_ELEMENTS,
     AddedElements,
     InputShaft,
@@ -41,8 +42,6 @@ CRANK, ENGINE, INPUT, OUTPUT, AXLE, WHEEL, VEHICLE = (
 """Nodes. ENGINE is the gearbox side of an input shaft or converter, CRANK its engine side."""
 SHAFT, INPUT_SHAFT, CONVERTER = "output shaft", "input shaft", "converter"
 LOAD, WALK = "load", "load walk"
-_LEAST_SPEED = 0.5
-"""Speed of the vehicle at the wheel [rad/s] below which a tyre is a damper."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +216,7 @@ def build_vehicle(side: OutputSide, added: AddedElements = NO_ADDED_ELEMENTS) ->
     elements = []
     if tyre is not None:
         body, inertia = VEHICLE, side.J_v - tyre.rim_inertia
-        fields = {"slip_stiffness": tyre.slip_stiffness, "least_speed": _LEAST_SPEED}
+        fields = {"slip_stiffness": tyre.slip_stiffness, "least_speed": LEAST_SPEED}
         if tyre.speed is not None:
             fields = {"stiffness": 0.0, "damping": tyre.slip_stiffness / tyre.speed}
         kind = "tyre" if tyre.speed is None else "spring_damper"

@@ -20,7 +20,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from typing import Any
 
-from drivetwin._util.optional_dependencies import describe_end
+from drivetwin._util.child_process import describe_end
 from drivetwin._util.progress import attach_listener
 from drivetwin.errors import DrivetwinError, InputError, Where
 

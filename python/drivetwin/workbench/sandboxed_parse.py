@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin._util.optional_dependencies import limit_memory
+from drivetwin._util.child_process import limit_memory
 from drivetwin.authoring.log_survey import (
     LogSurvey,
     find_pressure_columns,

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.analysis.friction_shape import fit_friction_shape, project_shape
-from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.estimation.result.method import FrictionShape
 from drivetwin.vehicle.spec import SensorTolerance
 from tests.estimation.asked import by_the_paper, stepped
 from tests.support import bench

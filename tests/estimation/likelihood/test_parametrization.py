@@ -140,3 +140,16 @@ def test_the_law_of_the_offgoing_element_is_a_level_of_its_partners() -> None:
     assert own.mu_c == pytest.approx(1.1 * partner.mu_c)
     assert own.mu_s - own.mu_c == pytest.approx(1.1 * (partner.mu_s - partner.mu_c) + 0.01)
     assert (own.v_s, own.mu_v) == pytest.approx((partner.v_s, 1.1 * partner.mu_v))
+
+
+def test_a_tyre_of_a_vehicle_that_starts_from_rest_is_the_damper_of_a_slow_one() -> None:
+    posed, point = _extend(EffectId.TYRE_SLIP, 2e-3)
+    (term,) = posed.terms
+    values = point.values.copy()
+    values[point.names.index("start0.wheel_speed")] = 0.0
+    at_rest = point.replace_values(values)
+    tyre = term.plant.build_added_elements(at_rest, term.plant.build_model(at_rest)).tyre
+    assert tyre is not None
+    assert tyre.speed is not None
+    assert tyre.speed > 0.0
+    assert tyre.rim_inertia > 0.0

@@ -34,8 +34,7 @@ from drivetwin.cli.options import (
     strict_flag,
 )
 from drivetwin.dyno import ScenarioName
-from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
-from drivetwin.estimation.result.method import Method
+from drivetwin.estimation.result.method import FrictionShape, Method
 from drivetwin.vehicle.effects import EffectId
 
 

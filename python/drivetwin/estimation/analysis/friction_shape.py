@@ -17,7 +17,6 @@ from scipy.optimize import lsq_linear
 from drivetwin._util.arrays import FloatArray, Span, propagate_variance
 from drivetwin._util.check_arguments import check_arguments
 from drivetwin.errors import IdentificationError
-from drivetwin.estimation.analysis.friction_shape_prior import FrictionShape
 from drivetwin.estimation.analysis.profile_likelihood import get_likelihood_fit
 from drivetwin.estimation.data.shift_data import ShiftElementKinematics, ShiftSignals
 from drivetwin.estimation.identification import Identification
@@ -35,6 +34,7 @@ from drivetwin.estimation.likelihood.priors import split_spans
 from drivetwin.estimation.likelihood.torque_record import TorqueRecord, build_record
 from drivetwin.estimation.likelihood.uncertainty.friction_bands import POINTS
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
+from drivetwin.estimation.result.method import FrictionShape
 from drivetwin.likelihood.gauss_newton import solve_step
 from drivetwin.likelihood.point import NormalEquations, ParameterVector, Prior
 from drivetwin.likelihood.term import RecordedTerm

@@ -172,7 +172,9 @@ def build_estimates(
     corrected = widen_by_rivals(corrected, fit, cause)
     slips = find_reference_slips(fit)
     own = _fit_parameters(fit, corrected, signals, drivelines, slips)
-    accused = _blame_card(fit, signals, drivelines, priors, corrected) if correction else None
+    accused = None
+    if correction is not None:
+        accused = _blame_card(fit, signals, drivelines, priors, corrected, slips)
     if accused is not None:
         corrected, own = accused
         predicted, cause = corrected, find_cause(corrected, fit)
@@ -339,10 +341,15 @@ def _blame_card(
     drivelines: Sequence[KnownDriveline],
     priors: EffectPriors,
     corrected: Correction,
+    slips: Mapping[str, float],
 ) -> tuple[Correction, _ReportedParameters] | None:
     """Correct the fit for the tolerances of sensors alone, if a wrong design value then explains
-    the log better than the effects of `corrected`. A single step shows that it does not."""
-    found, slips = None, find_reference_slips(fit)
+    the log better than the effects of `corrected`.
+
+    A single step shows that it does not in nearly all logs. `slips` [rad/s] are those at which μ is
+    reported, by element.
+    """
+    found = None
     for more_steps in (0, CORRECTION.more_steps):
         plain = correct_fit(fit, priors.drop_effects(), more_steps)
         if plain is None or plain.step.chi2 > EXPLAINED or is_at_bound(fit, plain.mean.values):

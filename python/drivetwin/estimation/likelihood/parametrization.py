@@ -315,8 +315,8 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
         found = build_added_elements(self.compute_added_element_values(point, model), model)
         if found.tyre is None:
             return found
-        speed = abs(float(point[f"{self.label}.{START[1]}"]))
-        return replace(found, tyre=replace(found.tyre, speed=speed))
+        speed = float(point[f"{self.label}.{START[1]}"])
+        return replace(found, tyre=found.tyre.linearise(speed))
 
     def _build_load(self, point: ParameterVector) -> RoadLoad:
         aero = self.get_value(point, AERO)

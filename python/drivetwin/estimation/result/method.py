@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Method and status of an identification, by the names used in results."""
+"""Method, status and shape of friction of an identification, by the names used in results."""
 
 from __future__ import annotations
 
@@ -29,3 +29,11 @@ class Method(StrEnum):
 
 DEFAULT_METHOD = Method.LIKELIHOOD
 """Method used by default."""
+
+
+class FrictionShape(StrEnum):
+    """Prior knowledge of μ over slip."""
+
+    FREE = "free"
+    FALLING = "falling"
+    RISING = "rising"

@@ -35,7 +35,7 @@ from typing import IO, Any, NoReturn
 import numpy as np
 
 from drivetwin import errors
-from drivetwin._util.optional_dependencies import (
+from drivetwin._util.child_process import (
     GRACE,
     describe_end,
     end_process,

@@ -127,7 +127,7 @@ PROGRESSIVE_SHAFT = Effect(
 def build_tyre_slip(at: OperatingPoint, std: float) -> list[Disturbance]:
     """Put a tyre of this slip between the wheel and the vehicle: linear, as a column is."""
     tyre = TyreSlip.from_slip(at.model.i_f * at.largest_shaft_torque, std, at.model.J_v)
-    tyre = replace(tyre, speed=abs(float(at.run.wheel_speed[0])))
+    tyre = tyre.linearise(float(at.run.wheel_speed[0]))
     added = at.term.plant.build_added_elements(at.point, at.model)
     return [Disturbance(outputs=at.compute_change(replace(added, tyre=tyre)))]
 
