@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -174,6 +175,18 @@ def test_bad_units(tmp_path: Path, unit: str, words: str, line: str) -> None:
         read(tmp_path, units={**UNITS, "TrqOut": unit})
     assert caught.value.where.channel == "TrqOut"
     assert line in caught.value.remedy
+
+
+def test_a_proposed_line_is_valid_with_the_names_of_measurement_tools(tmp_path: Path) -> None:
+    names = {"TrqOut": r"trqOut\XETK:1", "SpdIn": r"nTurb\XETK:1"}
+    table = {names.get(name, name): values for name, values in columns().items()}
+    units = {names.get(name, name): unit for name, unit in UNITS.items()}
+    units |= dict.fromkeys(names.values(), "")
+    with pytest.raises(UnitError) as caught:
+        read(tmp_path, table, units)
+    lines = caught.value.remedy.partition("if they are these: ")[2].split("; ")
+    stated = tomllib.loads("\n".join(lines))["channels"]
+    assert sorted(one["source"] for one in stated.values()) == sorted(names.values())
 
 
 def test_the_refusal_proposes_the_units_of_the_written_mapping(tmp_path: Path) -> None:

@@ -53,3 +53,13 @@ def test_a_card_of_another_gearbox_gets_its_remedy() -> None:
         refuse_without_shifts(log, other, drivetwin.detect_shifts(log, other))
     assert "another gearbox" in refusal.value.remedy
     assert Code.RATIO_UNKNOWN in {one.code for one in check_card(other, log)}
+
+
+def test_pressures_in_another_unit_get_the_remedy_of_their_channel() -> None:
+    log, card = read_run(run(load_scenario("paper_steps"), seed=1))
+    role = "pressure.B3"
+    small = replace(log[role], values=0.01 * log[role].values)
+    log = replace(log, channels={**log.channels, role: small})
+    with pytest.raises(DrivetwinError, match="pressures contradict the speeds") as refusal:
+        refuse_without_shifts(log, card, drivetwin.detect_shifts(log, card))
+    assert "unit and offset of pressure.B3" in refusal.value.remedy

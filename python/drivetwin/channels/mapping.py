@@ -18,6 +18,7 @@ from drivetwin.channels.roles import (
     ReadOptions,
     RememberedChannel,
     TimeColumn,
+    format_channel_entry,
     get_element,
     get_pressure_element,
     is_extra,
@@ -255,10 +256,8 @@ def _suggest_choice(role: str, candidates: Sequence[Column]) -> str:
     if len({one.name for one in candidates}) > 1:
         return _suggest_remedy(role)
     first = candidates[0]
-    return (
-        f"choose one in a channel mapping (--channels): channels.{role} = "
-        f'{{ source = "{first.name}", group = "{first.group}" }}'
-    )
+    entry = format_channel_entry(role, first.name, group=first.group)
+    return f"choose one in a channel mapping (--channels): {entry}"
 
 
 def _find_other_senders(chosen: Column, columns: Sequence[Column]) -> list[Finding]:

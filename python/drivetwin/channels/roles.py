@@ -15,6 +15,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from drivetwin._util.toml import format_entry
+
 _PREFIX, _COMMAND = "pressure.", "pressure_command."
 
 
@@ -212,6 +214,12 @@ class ChannelSpec:
     def matches(self, column: Column) -> bool:
         """Return True if the spec refers to this column."""
         return column.name == self.source and self.group in (None, column.group)
+
+
+def format_channel_entry(role: str, source: str, **entries: str | float) -> str:
+    """Write the line of a channel mapping that names the column of a role and states entries."""
+    stated = ", ".join(format_entry(*one) for one in {"source": source, **entries}.items())
+    return f"channels.{role} = {{ {stated} }}"
 
 
 @dataclass(frozen=True)

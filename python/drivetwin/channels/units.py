@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import AfterValidator
 
-from drivetwin.channels.roles import Quantity, get_quantity
+from drivetwin.channels.roles import Quantity, format_channel_entry, get_quantity
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.errors import UnitError, Where
 
@@ -183,8 +183,10 @@ def is_unit(spelling: str) -> bool:
 _BEGIN = "('drivetwin inspect LOG --write-mapping channels.toml' begins one)"
 
 
-def resolve_channel_unit(spelling: str | None, quantity: Quantity, where: Where) -> Unit:
-    """Return the unit of a channel that measures `quantity`.
+def resolve_channel_unit(
+    spelling: str | None, quantity: Quantity, where: Where, role: str = "<role>"
+) -> Unit:
+    """Return the unit of a channel that measures `quantity` and has a `role`.
 
     A state (gear, flag) needs no unit. Raises UnitError where the unit is missing, unknown,
     ambiguous or of another quantity; the message explains how to state it.
@@ -192,11 +194,8 @@ def resolve_channel_unit(spelling: str | None, quantity: Quantity, where: Where)
     if quantity is Quantity.STATE:
         return Unit(1.0, 0.0, Quantity.STATE)
     usual = ", ".join(map(repr, list_first_spellings(quantity)))
-    source = where.channel or "..."
-    remedy = (
-        f'assert it in the channel mapping {_BEGIN}: channels.<role> = {{ source = "{source}", '
-        f'unit = "..." }}, for a {quantity} one of {usual}'
-    )
+    entry = format_channel_entry(role, where.channel or "...", unit="...")
+    remedy = f"assert it in the channel mapping {_BEGIN}: {entry}, for a {quantity} one of {usual}"
     if spelling is None or not spelling.strip():
         raise UnitError("the file names no unit for this channel", remedy, where)
     unit = find_unit(spelling)

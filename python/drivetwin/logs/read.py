@@ -25,6 +25,7 @@ from drivetwin.channels.roles import (
     ReadOptions,
     RememberedChannel,
     RememberedMapping,
+    format_channel_entry,
     get_command_element,
     get_quantity,
     is_extra,
@@ -302,8 +303,7 @@ def _refuse_unitless(
         {role: _find_span(recording, places[role]) for role in unitless}
     )
     examples = "; ".join(
-        f'channels.{role} = {{ source = "{name}", unit = {_quote_units(role, proposals[role])} }}'
-        for role, name in refused.items()
+        _suggest_units(role, name, proposals[role]) for role, name in refused.items()
     )
     names = list(refused.values())
     raise UnitError(
@@ -322,12 +322,11 @@ def _find_span(recording: Recording, index: int) -> tuple[float, float] | None:
         return None
 
 
-def _quote_units(role: str, proposals: Sequence[Proposal]) -> str:
-    """Return the units that fit the values, of several the most frequent first; else all."""
-    units = [one.unit for one in proposals]
-    if units:
-        return " or ".join(f'"{unit}"' for unit in units)
-    return f'"..." (one of {", ".join(list_first_spellings(get_quantity(role)))})'
+def _suggest_units(role: str, source: str, proposals: Sequence[Proposal]) -> str:
+    """Suggest the units that fit the values, of several the most frequent first; else all."""
+    units = [one.unit for one in proposals] or ["...", *list_first_spellings(get_quantity(role))]
+    others = f" (or {', '.join(units[1:])})" if len(units) > 1 else ""
+    return format_channel_entry(role, source, unit=units[0]) + others
 
 
 def read_raw(path: Path, options: ReadOptions | None = None) -> RawLog:
@@ -424,7 +423,7 @@ def _make_checked_channel(
     notes = [report(Code.RECORDING, "", place, text=note) for note in raw.notes]
     unit = spec.unit if spec.unit is not None else raw.unit
     where = Where(file=file, channel=spec.source)
-    convert = partial(_convert, spec, resolve_channel_unit(unit, quantity, where))
+    convert = partial(_convert, spec, resolve_channel_unit(unit, quantity, where, role))
     channel = Channel(role, quantity, *convert(raw.time, raw.values), raw.name, unit or "")
     computed = quantity in AUXILIARY or get_command_element(role) is not None
     filling = None if computed else raw.filling

@@ -160,7 +160,7 @@ _GRIP = 0.05
 
 
 class CandidateRefusedError(Exception):
-    """A candidate turned out to be no usable shift; the text is the reason."""
+    """A candidate is no usable shift; `args` are the reason and, if known, a remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,7 +337,8 @@ def _locate_pressure_start(
     if grip.max() < P0.value - margin:
         raise CandidateRefusedError(
             f"pressures contradict the speeds: {oncoming} locks, but its pressure is only "
-            f"{grip.max() / BAR:.3g} bar then, below P0 = {P0.value / BAR:.3g} bar"
+            f"{grip.max() / BAR:.3g} bar then, below P0 = {P0.value / BAR:.3g} bar",
+            _suggest_pressure_check(oncoming),
         )
     onset = locate_pressure_onset(pressure, (P0.value, P0.std), begin.time)
     if onset is not None:
@@ -347,12 +348,20 @@ def _locate_pressure_start(
         raise CandidateRefusedError(
             f"pressures contradict the speeds: {offgoing} holds the gear, but the pressure of "
             f"{oncoming} is never below {rest.min() / BAR:.3g} bar from {earliest:.3f} s on, above "
-            f"P0 = {P0.value / BAR:.3g} bar; is it absolute, or in another unit?"
+            f"P0 = {P0.value / BAR:.3g} bar; is it absolute, or in another unit?",
+            _suggest_pressure_check(oncoming),
         )
     if onset is not None and onset.time <= begin.time:
         return onset, ()
     when = "nowhere" if onset is None else f"at {onset.time:.3f} s, after break-away"
     return begin, (report(Code.TORQUE_PHASE_EMPTY, element=oncoming, when=when),)
+
+
+def _suggest_pressure_check(element: str) -> str:
+    return (
+        f"check column, unit and offset of pressure.{element} in the channel mapping, and P0_bar "
+        f"of {element} on the card"
+    )
 
 
 def _check_rise_samples(pressure: Channel, oncoming: str, span: tuple[float, float]) -> None:

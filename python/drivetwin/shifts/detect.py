@@ -345,7 +345,7 @@ def detect_shifts(
             shifts.append(build_shift(search, before, after))
         except CandidateRefusedError as no_shift:
             span = (float(speeds.time[before.last]), float(speeds.time[after.first]))
-            rejected.append(RejectedShift(span, str(no_shift)))
+            rejected.append(RejectedShift(span, *no_shift.args))
     chained = _limit_phases(shifts, search.settings)
     rated = tuple(
         replace(one, quality=compute_shift_quality(log, card, one, speeds=speeds))
@@ -451,7 +451,7 @@ def require_shifts(log: ShiftLog, card: VehicleCard) -> FoundShifts:
 def refuse_without_shifts(log: ShiftLog, card: VehicleCard, found: FoundShifts) -> None:
     """Raise NoShiftError with the rejected candidates if no shift was found.
 
-    A cause in the card or the channel mapping comes first, with its remedy.
+    The remedy is that of a cause in the card or the channel mapping, else of a candidate.
     """
     if found.shifts:
         return
@@ -460,11 +460,11 @@ def refuse_without_shifts(log: ShiftLog, card: VehicleCard, found: FoundShifts) 
         [one.cause.rstrip(".") for one in causes]
         + [f"{one.time[0]:.3f} s to {one.time[1]:.3f} s: {one.reason}" for one in found.rejected]
     )
+    remedies = [*(one.remedy for one in causes), *(one.remedy for one in found.rejected)]
     raise NoShiftError(
         f"no usable gear shift; {reasons}" if reasons else "no gear shift: one gear throughout",
-        causes[0].remedy
-        if causes
-        else "record from a second before the torque phase to a second after lock-up; "
+        next(filter(None, remedies), "")
+        or "record from a second before the torque phase to a second after lock-up; "
         "check the ratios on the card and the speed channels with 'drivetwin inspect'",
         Where(file=log.source),
     )

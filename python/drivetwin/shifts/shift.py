@@ -89,10 +89,11 @@ class Shift:
 
 @dataclass(frozen=True)
 class RejectedShift:
-    """A candidate that is no usable shift, and why."""
+    """A candidate that is no usable shift, and why; `remedy` is empty where none is known."""
 
     time: tuple[float, float]
     reason: str
+    remedy: str = ""
 
 
 _WINDOW = 0.3

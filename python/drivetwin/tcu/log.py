@@ -116,7 +116,7 @@ def _load(
         what = f"the log has no column {spec.source!r}"
         raise MissingChannelError(what, "correct its name in the channel mapping", where)
     raw = recording.load(picked[0])
-    unit = resolve_channel_unit(spec.unit or raw.unit, get_quantity(role), where)
+    unit = resolve_channel_unit(spec.unit or raw.unit, get_quantity(role), where, role)
     values = unit.to_si(spec.sign * (spec.scale * raw.values + spec.offset))
     return raw.time + spec.time_shift, np.asarray(values)
 

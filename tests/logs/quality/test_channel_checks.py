@@ -128,6 +128,7 @@ def test_a_pressure_of_zero_throughout_is_an_open_element() -> None:
     ("role", "largest", "unit", "fits"),
     [
         ("pressure.B2", 14e5 * 1e5, "bar", "'Pa'"),  # Pa taken as bar
+        ("pressure.B2", 1400e5, "bar", 'unit = "kPa"'),  # before hPa, of which 1.4 bar would follow
         ("pressure.B2", 14.0, "Pa", "'bar'"),  # bar taken as Pa
         ("pressure.B2", 1400e5, "bar", "'kPa'"),
         ("pressure.B2", 200e5, "bar", "'psi'"),

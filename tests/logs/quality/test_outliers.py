@@ -246,3 +246,16 @@ def test_repeats_by_chance_are_kept() -> None:
     values = np.round(160.0 + 0.0145 * np.arange(400) + noise, 6)
     values[198:202] = values[199] + np.array([-0.026, 0.0, 0.0, 0.028])
     assert find("wheel_speed", values, time) == []
+
+
+def test_a_noisy_signal_is_cut_where_it_reached_the_ends_of_its_range_a_few_times() -> None:
+    true = torque()
+    values = np.clip(true, 1300.0, 2650.0)
+    left_out = find("output_torque", values)
+    cut = np.zeros(TIME.size, np.bool_)
+    for start, end in left_out:
+        cut[start:end] = True
+    assert np.array_equal(cut, values != true)
+    # A regulated pressure without noise rests at its largest number.
+    pressure = 1.4e6 * (1.0 - np.exp(-np.clip(TIME - 1.0, 0.0, 2.0) / 0.05))
+    assert find("pressure.B3", np.minimum(pressure, 1.39e6)) == []

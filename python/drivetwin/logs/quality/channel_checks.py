@@ -19,7 +19,7 @@ from drivetwin._util.arrays import (
     remember_for_arrays,
 )
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.channels.roles import AUXILIARY, Quantity
+from drivetwin.channels.roles import AUXILIARY, Quantity, format_channel_entry
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
@@ -109,7 +109,8 @@ _TYPICAL: dict[Quantity, tuple[float, float]] = {
     Quantity.TORQUE: (50.0, 3e4),
     Quantity.FRACTION: (0.05, 1.0),
 }
-"""Typical range of max|value|; a unit that brings the values into it is proposed."""
+"""Typical range of max|value|; units that bring the values into it are proposed, first the one that
+brings them nearest to its middle."""
 
 _MUST_VARY = frozenset(
     ("output_torque", "input_speed", "engine_speed", "output_speed", "wheel_speed")
@@ -241,15 +242,15 @@ _LOOKS: tuple[tuple[Callable[[Channel], bool], Look], ...] = (
         partial(_look_at_updates, lambda fresh: find_dropouts(fresh.time, fresh.values)),
     ),
     (lambda _: True, lambda one: find_spikes(one.time, one.values, one.quantity)),
+    (lambda one: one.quantity not in AUXILIARY, partial(_look_at_updates, _find_codes)),
+    (_has_sensor_noise, lambda one: find_clipping(one.values)),
     (lambda one: one.role == "engine_torque", partial(_look_at_updates, find_stuck)),
     (_has_sensor_noise, find_stuck),
-    (lambda one: one.quantity not in AUXILIARY, partial(_look_at_updates, _find_codes)),
     # Short cuts of an engine torque may be genuine.
     (
         lambda one: one.role == "output_torque",
         partial(_look_at_updates, lambda fresh: find_glitches(fresh.time, fresh.values)),
     ),
-    (_has_sensor_noise, lambda one: find_clipping(one.values)),
     (
         lambda one: one.quantity not in AUXILIARY,
         partial(_look_at_updates, lambda fresh: find_stale(fresh.values)),
@@ -422,17 +423,17 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
     if largest == 0.0 or lowest <= largest <= highest:
         return
     low, high = _TYPICAL[channel.quantity]
-    fitting = [
-        name
+    fitting = {
+        name: abs(np.log(factor * largest / np.sqrt(low * high)))
         for name, factor in list_usual_units(channel.quantity, channel.source_unit)
         if low <= factor * largest <= high
-    ]
+    }
+    units = sorted(fitting, key=fitting.__getitem__)
     side, limit = ("above", highest) if largest > highest else ("below", lowest)
     remedy = (
-        f"the numbers would fit {' or '.join(map(repr, fitting))}: assert the unit in the channel "
-        f'mapping, channels.{channel.role} = {{ source = "{channel.source_name}", '
-        f'unit = "{fitting[0]}" }}'
-        if fitting
+        f"the numbers would fit {' or '.join(map(repr, units))}: assert the unit in the channel "
+        f"mapping, {format_channel_entry(channel.role, channel.source_name, unit=units[0])}"
+        if units
         else f"correct unit or scale of channels.{channel.role} in the channel mapping"
     )
     raise PlausibilityError(
@@ -443,6 +444,10 @@ def _check_magnitude(channel: Channel, where: Where) -> None:
     )
 
 
+def _format_reversed(channel: Channel) -> str:
+    return format_channel_entry(channel.role, channel.source_name, sign=-1)
+
+
 def _check_sign(channel: Channel, where: Where) -> None:
     if channel.quantity is Quantity.PRESSURE:
         lowest, highest = float(channel.values.min()), float(channel.values.max())
@@ -450,8 +455,7 @@ def _check_sign(channel: Channel, where: Where) -> None:
             low, high = (format_with_unit(one, "Pa") for one in (lowest, highest))
             raise PlausibilityError(
                 f"gauge pressure goes down to {low}, but up to {high} only",
-                f"set the sign in the channel mapping: channels.{channel.role} = "
-                f'{{ source = "{channel.source_name}", sign = -1 }}',
+                f"set the sign in the channel mapping: {_format_reversed(channel)}",
                 where,
             )
     if (
@@ -460,7 +464,6 @@ def _check_sign(channel: Channel, where: Where) -> None:
     ):
         raise PlausibilityError(
             "the speed is negative for most of the log; forward motion counts positive",
-            f"set the sign in the channel mapping: channels.{channel.role} = "
-            f'{{ source = "{channel.source_name}", sign = -1 }}',
+            f"set the sign in the channel mapping: {_format_reversed(channel)}",
             where,
         )

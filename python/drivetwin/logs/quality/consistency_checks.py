@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivetwin._util.arrays import FloatArray, find_large_steps, find_true_runs, remember_for_arrays
 from drivetwin._util.display_units import format_with_unit
 from drivetwin.channels.filling import Filling, Interpolation
-from drivetwin.channels.roles import AUXILIARY, Quantity, get_quantity
+from drivetwin.channels.roles import AUXILIARY, Quantity, format_channel_entry, get_quantity
 from drivetwin.channels.shiftlog import Channel, find_uncovered_ends
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
 from drivetwin.findings import Code, Finding, Number, report
@@ -305,8 +305,9 @@ def check_torque_signs(channels: Mapping[str, Channel], file: str) -> None:
         raise PlausibilityError(
             f"{engine.source_name!r} and {output.source_name!r} have opposite signs for most of "
             "the log; both count positive when the engine drives the vehicle",
-            f"set the sign in the channel mapping: channels.output_torque = "
-            f'{{ source = "{output.source_name}", sign = -1 }}, or that of the engine torque',
+            "set the sign in the channel mapping: "
+            f"{format_channel_entry('output_torque', output.source_name, sign=-1)}, "
+            "or that of the engine torque",
             Where(file=file),
         )
 

@@ -126,7 +126,10 @@ _LEVELS = 1 << 17
 
 _CLIPPED_SAMPLES = 3
 _CLIPPED_RUNS = 3
-"""A limit is reached in so many runs of so many equal samples."""
+"""A limit is reached in so many runs of so many equal samples, or in fewer longer ones ..."""
+
+_TURNING = 1.0 / 3.0
+"""... of a signal that turns in this share of its steps: half of that of white noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -445,15 +448,26 @@ def _can_be_fill_pulse(values: FloatArray, run: tuple[int, int], possible: float
 
 
 def find_clipping(values: FloatArray) -> Damage | None:
-    """Samples at the largest or smallest number, where a fine signal rests there repeatedly."""
+    """Samples at the largest or smallest number, where a fine signal rests there and nowhere else.
+
+    A regulated signal without noise may rest at its largest number once.
+    """
+    limits = [float(values.max()), float(values.min())]
     same = find_true_runs(values[1:] == values[:-1], _CLIPPED_SAMPLES - 1)
-    for limit in (float(values.max()), float(values.min())):
+    if any(values[start] not in limits for start, _ in same):
+        return None
+    mask = np.zeros(values.size, np.bool_)
+    for limit in (one for one in limits if one != 0.0):
         at_limit = values == limit
         rests = find_true_runs(at_limit, _CLIPPED_SAMPLES)
-        elsewhere = any(values[start] != limit for start, _ in same)
-        if limit != 0.0 and len(rests) >= _CLIPPED_RUNS and not elsewhere:
-            mask = np.zeros(values.size, np.bool_)
-            for start, end in rests:
-                mask[start:end] = True
-            return Damage(mask, Code.SATURATED)
-    return None
+        samples = sum(end - start for start, end in rests)
+        often = len(rests) >= _CLIPPED_RUNS and len(rests) == len(same)
+        if often or (samples >= _CLIPPED_SAMPLES * _CLIPPED_RUNS and _turns(values[~at_limit])):
+            mask |= at_limit
+    return _make_damage(mask, Code.SATURATED)
+
+
+def _turns(values: FloatArray) -> bool:
+    """Return True if a signal (n,) turns from step to step as one with noise does."""
+    steps = np.diff(values)
+    return steps.size >= _ENOUGH and bool(np.mean(steps[1:] * steps[:-1] < 0.0) > _TURNING)
