@@ -208,6 +208,27 @@ def test_finds_messages_in_an_export_of_a_real_bus(name: str) -> None:
     assert gear.filling is None
 
 
+@pytest.mark.parametrize(
+    ("step", "late", "decimals"), [(1.0, 0.37, 9), (0.5, 0.12, 4), (2.0, 0.9, 6)]
+)
+def test_finds_the_updates_of_a_repeated_signal_behind_lines(
+    step: float, late: float, decimals: int
+) -> None:
+    """A torque of 10 ms in a table of 1 ms, which a tool moved onto other stamps by lines."""
+    updates = np.arange(0.0, 5.0, 0.01)
+    torque = 11.0 * np.round(measure_speed(updates, 3, 20.0) / 11.0)
+    rows = np.arange(0.0, 5.0, STEP)
+    repeated = torque[np.searchsorted(updates, rows + 1e-9, side="right") - 1]
+    time = np.arange(0.01, 4.9, step * STEP)
+    found = find_filling(time, np.round(np.interp(time, rows + late * STEP, repeated), decimals))
+    assert found is not None
+    assert found.interpolation.name == "STEPS"
+    assert found.period == pytest.approx(0.01, rel=1e-5)
+    number = np.round((found.time - late * STEP) / 0.01).astype(int)
+    assert np.array_equal(found.values, torque[number])
+    assert np.abs(found.time - late * STEP - updates[number]).max() < 0.5 * step * STEP
+
+
 @pytest.mark.parametrize("step", [0.5, 2.0])
 @pytest.mark.parametrize("rate", [1, 10])
 def test_rounding_makes_no_lines(step: float, rate: int) -> None:

@@ -13,6 +13,10 @@ their evidence, the logarithm of the ratio of their probabilities:
 - a cubic or linear spline with knots on a regular raster, at or between rows (`knot_fit`): knots
   on the raster explain the record better than those half a period away, and further knots between
   them explain nothing more. For a measured record each part prefers either raster by chance.
+
+A signal that a logger had repeated before a tool filled it up by lines is a third case: stairs with
+ramps of a few rows. With the value before it in each row of a ramp the record is that of a held
+signal, whose updates `update_raster` finds.
 """
 
 from __future__ import annotations
@@ -27,6 +31,7 @@ from drivetwin._util.arrays import (
     FloatArray,
     compute_median_step,
     find_largest,
+    find_run_bounds,
     find_true_runs,
     is_time_axis,
     remember_for_arrays,
@@ -41,6 +46,7 @@ from drivetwin.channels.line_corners import (
     has_short_lines,
     list_blurs,
 )
+from drivetwin.channels.update_raster import find_raster, find_updates
 
 _WINDOW, _LINES_WINDOW, _WINDOWS = 8192, 65536, 4
 """Rows of a window that is searched for a raster or for straight lines, and windows of a long
@@ -57,6 +63,8 @@ _BESIDE = 16
 """Lines of a spectrum on each side that show its level [count]."""
 _CHANCE = 1e-9
 """Probability from which on chance may have made a line of a spectrum: cost of work."""
+_STRAY = 0.05
+"""Share of the steps of stairs that may have other lengths: updates of two rows in turn [1]."""
 _PERIODS = 12
 """Most periods tried [count]: cost of work."""
 
@@ -66,6 +74,7 @@ class Interpolation(StrEnum):
 
     LINEAR = "linear"
     CUBIC = "cubic"
+    STEPS = "repetition and linear"
     UNKNOWN = "unknown"
 
 
@@ -98,13 +107,16 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     Returns
     -------
     Filling or None
-        None where each sample may be measured.
+        None where each sample may be measured, or the signal was only repeated.
     """
     if not find_largest(values) < _LARGEST:  # NaN is not below
         usable = np.abs(values) < _LARGEST
         time, values = time[usable], values[usable]
     if time.size < 2 * MIN_KNOTS or not is_time_axis(time):
         return None
+    stairs = _find_stairs(time, values)
+    if stairs is not None or find_raster(time, values) is not None:
+        return stairs
     if _is_cycle(_list_first_changes(values)):
         return None
     step = compute_median_step(time)
@@ -124,6 +136,39 @@ def find_filling(time: FloatArray, values: FloatArray) -> Filling | None:
     unknown = Filling(Interpolation.UNKNOWN, np.nan, step, nothing, nothing)
     parts = _list_liveliest(values, _cut(0, time.size, _LINES_WINDOW))
     return unknown if any(has_short_lines(time[part], values[part]) for part in parts) else None
+
+
+def _find_stairs(time: FloatArray, values: FloatArray) -> Filling | None:
+    """Find the updates of stairs whose steps are ramps of a few rows, all of as many but one.
+
+    A ramp ends at its update. It lasts for the step of the table that was filled up, and the value
+    of its last row shows how much of it is left.
+    """
+    slopes, step = np.diff(values), compute_median_step(time)
+    starts, ends = find_run_bounds(slopes != 0.0)
+    rows = ends - starts
+    if starts.size < MIN_KNOTS or 2 * np.sum(rows) > slopes.size:
+        return None
+    left = slopes[ends - 1] / (values[ends] - values[starts] + (values[ends] == values[starts]))
+    shortest = int(np.quantile(rows, _STRAY))
+    usual = (rows >= shortest) & (rows <= shortest + 1) & (left > 0.0) & (left <= 1.0)
+    ramps = usual & (rows > 1)
+    if np.mean(usual) < 1.0 - _STRAY or 2 * np.count_nonzero(ramps) < starts.size:
+        return None
+    held = values.copy()
+    for start, end in zip(starts[ramps].tolist(), ends[ramps].tolist(), strict=True):
+        held[start:end] = values[start]
+    # Of a ramp at an end of the record the length is unknown.
+    first = ends[0] if starts[0] == 0 else 0
+    end = starts[-1] + 1 if ends[-1] == slopes.size else time.size
+    time, held = time[first:end], held[first:end]
+    raster, found = find_raster(time, held), find_updates(time, held)
+    if raster is None or found is None:
+        return None
+    lasts = step * float(np.mean(rows[usual] - 1.0))
+    early = step - lasts * float(np.median(left[ramps])) if raster.early == 0.0 else 0.0
+    instants, samples = found
+    return Filling(Interpolation.STEPS, raster.period, step, instants - early, held[samples])
 
 
 def _find_lines(time: FloatArray, values: FloatArray) -> LineKnots | None:

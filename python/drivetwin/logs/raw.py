@@ -78,7 +78,7 @@ class RawChannel:
     @property
     def filling(self) -> Filling | None:
         """Measured samples of a column that was filled up; None if each sample may be measured."""
-        return find_filling(self.time, self.values) if self.raster is None else None
+        return find_filling(self.time, self.values)
 
     @property
     def range(self) -> tuple[float, float] | None:
