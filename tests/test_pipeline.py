@@ -13,7 +13,7 @@ import drivetwin
 from drivetwin.cli.synth import write_run
 from drivetwin.dyno.dyno import run
 from drivetwin.dyno.scenario_file import load_scenario
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, PlausibilityError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.findings import Code
 
@@ -73,3 +73,15 @@ def test_wrong_names_are_listed(data: tuple[Any, Any, Any]) -> None:
 def test_the_papers_method_takes_none(data: tuple[Any, Any, Any]) -> None:
     with pytest.raises(InputError, match="paper's method takes no fixed values"):
         drivetwin.identify(*data, drivetwin.Method.PAPER, fixed={"eta": 0.97})
+
+
+def test_torques_that_no_gearbox_explains_are_refused(
+    data: tuple[Any, Any, Any], tmp_path: Path
+) -> None:
+    log, card, shifts = data
+    mapping = tmp_path / "map.toml"
+    mapping.write_text('channels.engine_torque = { source = "EngTrq", scale = 0.1 }\n', "utf-8")
+    tenth = drivetwin.read_log(log.source, card, mapping)
+    with pytest.raises(PlausibilityError, match="output torque is 8") as refusal:
+        drivetwin.identify(tenth, card, shifts)
+    assert "scale and unit of 'EngTrq'" in refusal.value.remedy

@@ -13,7 +13,7 @@ from drivetwin._util.check_arguments import check_arguments
 from drivetwin._util.progress import TimedStages
 from drivetwin.channels.recognition import refuse_commands
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.errors import InputError, MappingError, Where
+from drivetwin.errors import InputError, MappingError, PlausibilityError, Where
 from drivetwin.estimation.actuators import FoundActuators, identify_actuators
 from drivetwin.estimation.data.actuators import collect_pressures
 from drivetwin.estimation.data.prepare import get_usual_gains, prepare
@@ -116,7 +116,7 @@ def identify(
         )
     stages = _BY_METHOD[method]
     with stages.enter("preparation", "preparing the log"):
-        _refuse_wrong_pressures(log, card, shifts)
+        _refuse_wrong_channels(log, card, shifts)
         actuators = _identify_actuators([log], card)
         prepared = _prepare_checked(log, apply_locks(card, locks), shifts)
         if method is not Method.PAPER:
@@ -160,16 +160,37 @@ def identify_jointly(
     with _JOINT.enter("preparation", "preparing the logs"):
         pairs = list(zip(logs, shifts, strict=True))
         for log, found in pairs:
-            _refuse_wrong_pressures(log, card, found)
+            _refuse_wrong_channels(log, card, found)
         actuators = _identify_actuators(logs, card)
         prepared = [align_output_torque(_prepare_checked(log, card, one)) for log, one in pairs]
     with _JOINT.enter("estimation"):
         return _attach_actuators(identify_joint(prepared), actuators)
 
 
-def _refuse_wrong_pressures(log: ShiftLog, card: VehicleCard, found: FoundShifts) -> None:
-    """Raise MissingChannelError if the pressures of the shifts are commands, MappingError if those
-    of two elements are exchanged."""
+IMPOSSIBLE = 2.0
+"""Factor beyond a usual ratio of the torques from which no gearbox explains it: several times what
+load and losses do, and less than a wrong power of ten."""
+
+
+def _refuse_wrong_channels(log: ShiftLog, card: VehicleCard, found: FoundShifts) -> None:
+    """Refuse a log whose fit would fail because of one channel.
+
+    Raises MissingChannelError if the pressures of the shifts are commands, MappingError if those of
+    two elements are exchanged, and PlausibilityError if both torques contradict each other in all
+    gears of the shifts.
+    """
+    contrary = {
+        one.names["gear"]: one
+        for one in log.findings
+        if one.code is Code.TORQUES_DIFFER
+        and not one.numbers["low"].value / IMPOSSIBLE
+        <= one.numbers["share"].value
+        <= one.numbers["high"].value * IMPOSSIBLE
+    }
+    gears = {gear for one in found.shifts for gear in (one.start_gear, one.end_gear)}
+    if gears and gears <= contrary.keys():
+        first = contrary[found.shifts[0].start_gear]
+        raise PlausibilityError(first.cause, first.remedy, Where(file=log.source))
     refuse_commands(log, [name for one in found.shifts for name in (one.offgoing, one.oncoming)])
     for one in find_causes(log, card):
         if one.code is Code.PRESSURES_EXCHANGED:

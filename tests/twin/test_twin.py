@@ -177,6 +177,12 @@ def test_an_override_without_effect_is_refused_with_those_that_act(twin: Twin, n
     assert "J_prime_2, J_prime_3, P0.B2, P0.B3, drum.B2, drum.B3" in caught.value.remedy
 
 
+def test_an_output_inertia_that_leaves_none_for_the_engine_is_named(twin: Twin) -> None:
+    with pytest.raises(InputError, match="no inertia remains for the engine") as refusal:
+        twin.build_dual_clutch(SHIFT, overrides={"J_out": 900.0})
+    assert "J_out_kgm2" in refusal.value.remedy
+
+
 def test_missing_parameter_is_named_with_its_reason(twin: Twin) -> None:
     reported = dict(twin.parameters)
     reported["k_o"] = replace(reported["te_delay"], id="k_o", reason="no oscillation after lock-up")

@@ -185,6 +185,12 @@ class Twin(DisplayMixin):
         ratio = given.get(make_ratio_id(gear), self.get_gear(gear).ratio / self.i_in) * self.i_in
         final_drive = given.get(FINAL_DRIVE, self.final_drive)
         J_e = values[inertia_id] - values["J_out"] / ratio**2
+        if J_e <= 0.0:
+            raise InputError(
+                f"{inertia_id} = {values[inertia_id]:.4g} kg·m² contains J_out / ratio² = "
+                f"{values['J_out'] / ratio**2:.4g} kg·m²: no inertia remains for the engine",
+                "correct J_out_kgm2 or the ratios on the vehicle card",
+            )
         return DualClutch(
             J1=J_e / values["eta"],
             J2e=0.0,
