@@ -105,7 +105,7 @@ def test_estimates_are_told(
     out = capsys.readouterr().out
     assert "mu.B3" in out
     assert "drift per" in " ".join(out.split())
-    assert "Not estimated: from the card in most logs" in out
+    assert "at least 6 are needed, of one unit 5" in out
     assert main(["fleet", "estimate", store, "--parameter", "mu.X9", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"estimates": [], "missing": ["mu.X9"]}
 

@@ -41,6 +41,26 @@ def test_columns_rates_and_roles(bench_files: Files, capsys: pytest.CaptureFixtu
     assert found["notes"] == []
 
 
+def test_the_log_of_a_gearbox_control_is_read_as_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, card = tmp_path / "control.csv", tmp_path / "control.card.toml"
+    assert main(["synth", "--scenario", "controller_log", "-o", str(log)]) == 0
+    capsys.readouterr()
+    found = _inspect(capsys, str(log), "--vehicle", str(card))
+    columns = {column["name"]: column for column in found["columns"]}
+    assert columns["p_K3_cmd"]["roles"] == ["pressure_command.K3"]
+    assert columns["p_K3_cmd"]["rate"] == pytest.approx(50.0)  # a ramp that it computed itself
+    assert (found["notes"], found["findings"], found["refusal"]) == ([], [], None)
+    log.write_text(log.read_text("utf-8").replace("gear_target", "Soll"), "utf-8")
+    found = _inspect(capsys, str(log), "--vehicle", str(card))
+    assert "requested_gear" in found["refusal"]["what"]
+    # Other commands name the kind of the card in place of its keys.
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["card", "check", str(card)]) == 2
+    assert "this is the card of a gearbox control" in capsys.readouterr().err
+
+
 def test_a_log_without_units_names_or_all_samples_is_described_not_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

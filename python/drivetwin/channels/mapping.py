@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from drivetwin.channels.recognition import infer_candidates, prefer_filled
+from drivetwin.channels.recognition import find_candidates, infer_candidates, prefer_filled
 from drivetwin.channels.roles import (
     MEASURED,
     ROLES,
@@ -273,6 +273,14 @@ def make_spec(column: Column, columns: Sequence[Column]) -> ChannelSpec:
     """Return the spec that picks a column: with its group where the name alone would not."""
     alike = sum(other.name == column.name for other in columns)
     return ChannelSpec(column.name, group=column.group if alike > 1 else None)
+
+
+def name_commands(columns: Sequence[Column], elements: Iterable[str], stated: Mapped) -> Mapped:
+    """Return a mapping with the commanded pressures of `elements` that have one column each."""
+    roles = map(make_command_role, elements)
+    found = {role: find_candidates(columns, role) for role in roles}
+    specs = {role: make_spec(some[0], columns) for role, some in found.items() if len(some) == 1}
+    return replace(stated, channels={**specs, **stated.channels})
 
 
 def _refuse_absent(

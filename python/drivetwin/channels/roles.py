@@ -117,6 +117,9 @@ ROLES: dict[str, Quantity] = {
 NEEDED = ("engine_torque", "output_torque", "input_speed", "output_speed", "wheel_speed")
 """Roles without which a log cannot be identified in absolute terms (pressures come on top)."""
 
+FOR_CONTROL = ("engine_speed", "input_speed", "output_speed", "engine_torque", "requested_gear")
+"""Roles without which the log of a gearbox control cannot be used (commands come on top)."""
+
 FOR_SHIFTS = ("input_speed", "output_speed")
 """Roles without which no shift can be found."""
 

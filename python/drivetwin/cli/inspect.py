@@ -10,7 +10,7 @@ from pathlib import Path
 
 from drivetwin._util.atomic import write_text
 from drivetwin.authoring.log_survey import find_pressure_columns, name_pressures
-from drivetwin.channels.mapping import Mapped
+from drivetwin.channels.mapping import Mapped, name_commands
 from drivetwin.channels.mapping_file import Draft, format_mapping, read_mapping
 from drivetwin.channels.roles import FOR_SHIFTS, ReadOptions, TimeColumn
 from drivetwin.cli.input_files import find_mapping
@@ -18,7 +18,7 @@ from drivetwin.cli.output import print_line, show_step, to_error_document
 from drivetwin.cli.requests.identification import Inspect
 from drivetwin.errors import DrivetwinError, UnitError
 from drivetwin.files.records import dump_findings
-from drivetwin.findings import Finding
+from drivetwin.findings import Code, Finding, report
 from drivetwin.logs.formats.can.database import list_databases
 from drivetwin.logs.formats.detect import name_project_mapping, open_stated
 from drivetwin.logs.raw import Recording, Remembered
@@ -34,6 +34,8 @@ from drivetwin.logs.survey import (
 from drivetwin.plausibility.check import drop_card_findings
 from drivetwin.report.blocks import Block, Outcome, TextBlock, build_findings_section, make_notes
 from drivetwin.report.inputs import build_column_table
+from drivetwin.tcu.card import ControllerCard, is_controller_card, load_controller_card
+from drivetwin.tcu.log import read_controller_log
 from drivetwin.vehicle.card import VehicleCard, is_ratio_card, load_card
 
 
@@ -41,12 +43,15 @@ def inspect(request: Inspect) -> Outcome:
     """Survey a log, read it as the other commands do, and write the mapping."""
     log, write_mapping, accept = request.log, request.write_mapping, request.accept_proposals
     vehicle = request.vehicle
-    # A card of the ratios alone names no pressures.
-    card = None if vehicle is None or is_ratio_card(vehicle) else load_card(vehicle)
-    stated = find_mapping(request.channels, log)
+    stated, card, control = find_mapping(request.channels, log), None, None
+    # A card of the ratios alone names no pressures, that of a gearbox control commanded ones.
+    if vehicle is not None and is_controller_card(vehicle):
+        control = load_controller_card(vehicle)
+    elif vehicle is not None and not is_ratio_card(vehicle):
+        card = load_card(vehicle)
     with show_step(f"reading {log.name}"):
         try:
-            seen = _look_at(log, card, stated)
+            seen = _look_at(log, card, stated, control)
         except DrivetwinError as fault:
             if write_mapping is not None:
                 _write_unread(write_mapping, card, stated, fault, list_databases(log))
@@ -57,7 +62,7 @@ def inspect(request: Inspect) -> Outcome:
             text = format_mapping(found.mapping, found.options, found.names, draft)
             write_text(write_mapping, text)
         if write_mapping is not None and accept:
-            seen = _look_at(log, card, read_mapping(write_mapping))
+            seen = _look_at(log, card, read_mapping(write_mapping), control)
             draft = draft_mapping(seen.survey, unnamed_step=seen.unnamed_step)
     error = None if seen.refusal is None else to_error_document(seen.refusal)["error"]
     remarks = {"findings": dump_findings(seen.findings), "refusal": error}
@@ -91,7 +96,7 @@ def _build_seen(seen: _Seen, draft: Draft, name: str) -> Iterator[Block]:
     if seen.refusal is not None:
         proposed = isinstance(seen.refusal, UnitError) and draft.proposed_units
         reason = replace(seen.refusal, remedy="") if proposed else seen.refusal
-        yield TextBlock(f"{seen.refused_by} this log: {reason}")
+        yield TextBlock(f"{seen.refused_by} this log: {reason.format_for_shell()}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +113,20 @@ class _Seen:
     unnamed_step: float | None = None
 
 
-def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
-    """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds."""
+def _look_at(
+    log: Path, card: VehicleCard | None, stated: Mapped, control: ControllerCard | None = None
+) -> _Seen:
+    """Survey a log and read it as for use; a log without a unit of time is surveyed in seconds.
+
+    With the card of a gearbox control it is read as one of that control.
+    """
+    commanded = () if control is None else tuple(control.gains)
     try:
         with open_stated(log, stated) as (opened, used):
             recording = Remembered(opened)
-            found, names, used = _survey(recording, log, card, used)
+            found, names, used = _survey(recording, log, card, used, commanded)
+            if control is not None:
+                return _Seen(found, *_read_as_control_log(log, control, used))
             findings, refusal, refused_by = _read_as_mapped_log(
                 recording, log, names, used, gearing=card is not None
             )
@@ -131,13 +144,17 @@ def _look_at(log: Path, card: VehicleCard | None, stated: Mapped) -> _Seen:
     with open_stated(log, seconds if time.unit is None else stated, bare) as (opened, used):
         recording = Remembered(opened)
         options = stated.options if used.file == stated.file else ReadOptions()
-        found, _, _ = _survey(recording, log, card, replace(used, options=options))
+        found, _, _ = _survey(recording, log, card, replace(used, options=options), commanded)
         step = find_shortest_step(recording)
     return _Seen(found, used.findings, refusal, "shifts and identify refuse", step)
 
 
 def _survey(
-    recording: Recording, log: Path, card: VehicleCard | None, stated: Mapped
+    recording: Recording,
+    log: Path,
+    card: VehicleCard | None,
+    stated: Mapped,
+    commanded: Sequence[str],
 ) -> tuple[Survey, VehicleCard | None, Mapped]:
     """Survey a log; return also the card and mapping with the names of the pressures.
 
@@ -145,7 +162,9 @@ def _survey(
     """
     names = card
     specs = {}
-    if card is None:
+    if commanded:
+        stated = name_commands(recording.columns, commanded, stated)
+    elif card is None:
         specs = find_pressure_columns(recording.columns, stated, any_name=False)
     if specs:
         names, stated = name_pressures(specs, stated)
@@ -171,6 +190,21 @@ def _write_unread(
     draft = draft_unread(elements, stated.channels, fault.what, databases)
     write_text(path, format_mapping(stated.channels, stated.options, stated.names, draft))
     print_line(f"wrote {path}", stderr=True)
+
+
+def _read_as_control_log(
+    log: Path, card: ControllerCard, stated: Mapped
+) -> tuple[tuple[Finding, ...], DrivetwinError | None, str]:
+    """Cut the shifts of the log of a gearbox control; return findings, error and who refuses it."""
+    try:
+        left_out = read_controller_log(log, card, stated).left_out
+    except DrivetwinError as fault:
+        return (), fault, "identify refuses"
+    return (
+        tuple(report(Code.RECORDING, text=f"shift left out, {one}") for one in left_out),
+        None,
+        "",
+    )
 
 
 def _read_as_mapped_log(

@@ -152,7 +152,11 @@ def _build_parameters_section(found: Sequence[JointEstimate], missing: Sequence[
     blocks = make_tables("Shared values, at the fields' means.", columns, rows)
     blocks += make_notes("Of all parameters", shared)
     names = ", ".join(map(get_parameter_label, missing))
-    blocks += make_notes("Not estimated: from the card in most logs", [names] if names else [])
+    blocks += make_notes(
+        "Not estimated: too few logs with a value that is not from the card; of several units at "
+        "least 6 are needed, of one unit 5, for each field one more",
+        [names] if names else [],
+    )
     return Section(
         "parameters",
         "Fleet values",

@@ -16,11 +16,13 @@ from drivetwin.channels.mapping import Mapped, combine_specs, make_spec, select_
 from drivetwin.channels.mapping_file import Candidate, Draft, Stub, UnitGap
 from drivetwin.channels.recognition import find_hints, infer_candidates
 from drivetwin.channels.roles import (
+    FOR_CONTROL,
     NEEDED,
     ROLES,
     ChannelSpec,
     Quantity,
     ReadOptions,
+    get_command_element,
     get_quantity,
     make_pressure_role,
 )
@@ -259,7 +261,8 @@ def survey_recording(
         roles = tuple(role for role, found in candidates.items() if column in found)
         try:
             channel = recording.load(index)
-            filling = channel.filling if _is_rising(channel.time) else None
+            computed = any(get_command_element(role) is not None for role in roles)
+            filling = None if computed or not _is_rising(channel.time) else channel.filling
             is_ignored = column.name in ignored and not roles
             looked.append(_make_column(column, channel, filling, roles, ignored=is_ignored))
             if filling is not None and column not in mapped:
@@ -343,14 +346,15 @@ def _describe_open_roles(
         for role, found in candidates.items()
         if len(found) > 1
     ]
+    of_control = any(get_command_element(role) is not None for role in candidates)
     wanted = [
-        *NEEDED,
+        *(NEEDED if card or not of_control else FOR_CONTROL),
         *(make_pressure_role(element) for element in (card.elements if card else ())),
     ]
     missing = [role for role in wanted if not candidates.get(role)]
     if missing:
         notes.append(f"no column for {', '.join(missing)}: name it in a channel mapping")
-    if card is None:
+    if card is None and not of_control:
         notes.append(
             "pressures are recognised by the elements of a vehicle card: give --vehicle CARD; "
             "'drivetwin card new -o CARD.toml --from LOG' writes one"

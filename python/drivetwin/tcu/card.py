@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.errors import CardError
+from drivetwin.vehicle.card import CONTROLLER_KEY
 from drivetwin.vehicle.schema import PriorEntry, PriorTable, RadiusEntry
 from drivetwin.vehicle.spec import PriorValue
 
@@ -158,7 +159,7 @@ def is_controller_card(path: Path) -> bool:
 
     Raises CardError where the file is no TOML.
     """
-    return "changes" in read_toml(path, CardError)
+    return CONTROLLER_KEY in read_toml(path, CardError)
 
 
 def load_controller_card(path: Path) -> ControllerCard:

@@ -11,10 +11,16 @@ import numpy as np
 from scipy.constants import zero_Celsius
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.channels.mapping import make_spec
+from drivetwin.channels.mapping import Mapped, make_spec
 from drivetwin.channels.mapping_file import read_mapping, read_project_mapping
 from drivetwin.channels.recognition import find_candidates
-from drivetwin.channels.roles import ChannelSpec, Column, get_quantity, make_command_role
+from drivetwin.channels.roles import (
+    FOR_CONTROL,
+    ChannelSpec,
+    Column,
+    get_quantity,
+    make_command_role,
+)
 from drivetwin.channels.units import resolve_channel_unit
 from drivetwin.errors import MappingError, MissingChannelError, NoShiftError, Where
 from drivetwin.logs.formats.detect import open_recording
@@ -76,7 +82,7 @@ class ControllerLog:
 
 
 def read_controller_log(
-    path: Path, card: ControllerCard, mapping: Path | None = None
+    path: Path, card: ControllerCard, mapping: Path | Mapped | None = None
 ) -> ControllerLog:
     """Read the shifts of a log.
 
@@ -90,7 +96,10 @@ def read_controller_log(
     NoShiftError
         Where no shift has the rows that a fit needs, with the reasons.
     """
-    stated = read_project_mapping(path) if mapping is None else read_mapping(mapping)
+    if isinstance(mapping, Mapped):
+        stated = mapping
+    else:
+        stated = read_project_mapping(path) if mapping is None else read_mapping(mapping)
     with open_recording(path, stated.options) as recording:
         specs = _find_columns(path, card, dict(stated.channels), recording.columns)
         raw = {role: _load(recording, spec, role, path) for role, spec in specs.items()}
@@ -127,7 +136,7 @@ def _find_columns(
     """Return the column of each role. Raises the typed errors of a missing or ambiguous one."""
     used = {name for levers in card.levers.values() for name in levers}
     commands = [make_command_role(name) for name in sorted(used)]
-    needed = [*SPEEDS, "engine_torque", _TARGET, *commands]
+    needed = [*FOR_CONTROL, *commands]
     found = {}
     for role in [*needed, _GEAR, _OIL, make_command_role(card.lockup)]:
         if role in stated:

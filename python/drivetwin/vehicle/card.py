@@ -285,6 +285,10 @@ __all__ = [
 ]
 
 
+CONTROLLER_KEY = "changes"
+"""Table of gear changes, which only the card of a gearbox control has."""
+
+
 def load_card(path: Path | str) -> VehicleCard:
     """Read a vehicle card.
 
@@ -292,6 +296,13 @@ def load_card(path: Path | str) -> VehicleCard:
     wrong types, missing keys, impossible or contradicting ratios.
     """
     document = read_toml(path, CardError)
+    if CONTROLLER_KEY in document:
+        raise CardError(
+            "this is the card of a gearbox control, not of a vehicle",
+            "'drivetwin inspect' and 'drivetwin identify' take it; other commands take the twin "
+            "that identify writes, or a vehicle card",
+            Where(file=str(path), key=CONTROLLER_KEY),
+        )
     raise_faults(
         check_card(document),
         CardError,
