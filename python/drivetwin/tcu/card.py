@@ -13,8 +13,7 @@ from pydantic import Field, model_validator
 from drivetwin._util.arrays import FloatArray
 from drivetwin._util.toml import StrictModel, raise_faults, read_toml, validate_schema
 from drivetwin.errors import CardError
-from drivetwin.vehicle.card import CONTROLLER_KEY
-from drivetwin.vehicle.schema import PriorEntry, PriorTable, RadiusEntry
+from drivetwin.vehicle.schema import CONTROLLER_KEY, PriorEntry, PriorTable, RadiusEntry
 from drivetwin.vehicle.spec import PriorValue
 
 USUAL = {

@@ -18,6 +18,7 @@ from drivetwin.simulation.added_elements import Converter
 from drivetwin.simulation.dual_clutch import LossLaw
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.schema import (
+    CONTROLLER_KEY,
     CardFile,
     ElementTable,
     GearTable,
@@ -283,10 +284,6 @@ __all__ = [
     "compute_brake_ratios",
     "load_card",
 ]
-
-
-CONTROLLER_KEY = "changes"
-"""Table of gear changes, which only the card of a gearbox control has."""
 
 
 def load_card(path: Path | str) -> VehicleCard:

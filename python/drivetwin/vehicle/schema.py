@@ -39,6 +39,8 @@ from drivetwin.vehicle.spec import (
 )
 
 _Table = TypeVar("_Table", bound=StrictModel)
+CONTROLLER_KEY = "changes"
+"""Table of gear changes, which only the card of a gearbox control has."""
 MOST_PRESSURE = 1e6
 """Largest fill pressure of a card [bar]; a usual one entered in Pa is left to `card check`."""
 MOST_GAIN = 1e3
