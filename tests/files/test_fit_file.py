@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -49,6 +51,14 @@ def test_the_text_reads_back_equal_and_is_the_same_each_time() -> None:
     assert text == build().to_json()
     assert type(build()).model_validate_json(text) == build()
     assert "NaN" not in text
+
+
+def test_an_interval_that_is_open_on_a_side_is_stored_as_none() -> None:
+    found = fit_log(ModelName.ENGINE_START)
+    wide = replace(found, intervals={**found.intervals, "shaft.damping": (0.1, np.inf)})
+    file = build_fit_file(wide, ["k0.csv"], {})
+    assert file.unknowns["shaft.damping"].interval is None
+    assert type(file).model_validate_json(file.to_json()) == file
 
 
 def test_a_wrong_key_or_type_is_refused() -> None:

@@ -19,6 +19,7 @@ from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Measured, Recording
 from drivetwin.fit.synthesize import ModelName, read_builtin, synthesize_log
 from drivetwin.fit.unknown import Unknown
+from drivetwin.likelihood.budget import limit_evaluations
 from drivetwin.modeling.model import Model
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output, Start
@@ -240,6 +241,50 @@ def test_a_search_without_explanation_ends_at_its_work_limit(
     assert Code.SEARCH_LIMITED in {one.code for one in found.findings}
     assert found.status is ModelStatus.NOT_VALID
     assert 1 <= len(found.starts) < 8  # four rounds of two starts without the limit
+
+
+def test_a_first_guess_that_leads_to_the_recording_needs_no_draws(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = make_log(ModelName.TIP_IN)
+    shafts = {**made.model.unknowns, "shaft.stiffness": Unknown(2000.0, 2500.0)}
+    model = replace(made.model, unknowns=shafts)
+    problem, point, _ = build_problem(model, [made.recording])
+    weighted = problem.update_weighting(point)
+    assert weighted.cost(point) > 200.0 * problem.size
+    monkeypatch.setattr(search, "refine_draws", lambda *_: pytest.fail("draws"))
+    found = fit_network(model, [made.recording])
+    stiffness = found.values["shaft.stiffness"]
+    assert stiffness == pytest.approx(made.truth["shaft.stiffness"], rel=0.05)
+
+
+def test_work_beside_a_minimum_that_is_far_from_the_recording_is_limited(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(search, "MAX_REFIT_WORK", 10.0)
+    made = make_log(ModelName.TIP_IN)
+    wheel = made.recording.outputs["wheel speed"]
+    outputs = {**made.recording.outputs, "wheel speed": replace(wheel, values=1.3 * wheel.values)}
+    found = fit_network(made.model, [replace(made.recording, outputs=outputs)])
+    assert found.status is ModelStatus.NOT_VALID
+    assert found.chi2 > 120.0
+    assert found.moved == ()
+
+
+def test_a_motion_that_the_recording_cannot_show_is_not_simulated() -> None:
+    made = make_log(ModelName.TIP_IN)
+    problem, point, _ = build_problem(made.model, [made.recording])
+    damping = point.names.index("shaft.damping")
+    costs = []
+    for factor in (1.0, 30.0, 1e4):
+        values = point.values.copy()
+        values[damping] += np.log(factor)
+        with limit_evaluations(1e6) as budget:
+            costs.append((problem.cost(point.replace_values(values)), 1e6 - budget.left))
+    usual, fast, fastest = costs
+    assert np.isfinite([usual[0], fast[0]]).all()
+    assert fast[1] > usual[1]  # a stiff run takes more steps
+    assert fastest[0] == np.inf
 
 
 def test_a_coast_down_needs_no_input() -> None:

@@ -53,6 +53,11 @@ def test_speeds_and_torques_are_read_in_si(tmp_path: Path) -> None:
     assert recording.inputs["motor torque"].values.max() == pytest.approx(180.0, abs=5.0)
 
 
+def test_a_node_may_turn_backwards(tmp_path: Path) -> None:
+    recording = read(tmp_path, {'source = "WhlSpd"': 'source = "WhlSpd"\nsign = -1'})
+    assert recording.outputs["wheel speed"].values[:50].mean() == pytest.approx(-100.0, abs=0.2)
+
+
 def test_a_role_without_a_column_or_with_two_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MissingChannelError, match="no column has a name of 'motor_torque'"):
         read(tmp_path, ROLES, {"MotTrq": "Kanal7"})

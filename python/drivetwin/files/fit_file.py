@@ -13,8 +13,8 @@ from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.files.records import (
     FindingRecord,
     FitRecord,
-    Interval,
     OptionalFloat,
+    OptionalInterval,
     ParameterRecord,
     Record,
     SchemaName,
@@ -28,10 +28,10 @@ FIT_SCHEMA = "drivetwin/fit-1"
 
 class UnknownRecord(ParameterRecord):
     """An unknown, SI. `minimum` is its value at the minimum, whatever its verdict; `interval` the
-    95 % interval about it, of a positive number by its logarithm."""
+    95 % interval about it, of a positive number by its logarithm; None where a side is open."""
 
     minimum: FiniteFloat
-    interval: Interval
+    interval: OptionalInterval = None
 
 
 class FixedRecord(Record):

@@ -134,8 +134,9 @@ def build_problem(
     lower, upper = np.array(found.limits).T
     point = ParameterVector(tuple(found.names), np.array(found.values))
     prior = add_rows(prior, point, numbers.derived)
-    for term in terms:  # raises InputError for a start or output that the network lacks
-        term.build_task(point).simulate()
+    for k, term in enumerate(terms):
+        term.build_task(point).simulate()  # raises InputError for a start or output that is none
+        terms[k] = replace(term, plant=term.plant.limit_rate(point, term.record.time))
     for recording in recordings:
         _require_used(model, recording)
     reach = np.full(len(found.names), np.inf)

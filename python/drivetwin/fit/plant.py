@@ -4,22 +4,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
+
+import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin.errors import InputError
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.places import CHANNEL, Numbers, Place
 from drivetwin.fit.unknown import Setting, SoughtNumber
+from drivetwin.likelihood.budget import EXPANSION, RUN, charge
 from drivetwin.likelihood.objective import LikelihoodObjective
 from drivetwin.likelihood.output import Channel
 from drivetwin.likelihood.point import ParameterVector
 from drivetwin.likelihood.recorded_data import RecordedData
 from drivetwin.likelihood.term import RecordedPlant, RecordedTerm
 from drivetwin.simulation.dual_clutch import Accuracy, Signal
+from drivetwin.simulation.linearize import find_fastest_rate
 from drivetwin.simulation.network import Element, Output, Sine, Start, make_input
 from drivetwin.simulation.network_sensitivity import NetworkTask
+from drivetwin.simulation.variable import Variable, list_variables
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +37,8 @@ class Plant(RecordedPlant[RecordedData]):
     largest magnitudes of the others, SI. `places` are the numbers by path, `settings` those that
     the unknowns `sought` set. `own` are the unknowns of the start of this recording by node or
     shaft, `fixed` the numbers beside the unknowns that may move. `label` precedes the start in the
-    vector of the unknowns: `log1.start.engine`; empty where there is one recording.
+    vector of the unknowns: `log1.start.engine`; empty where there is one recording. `usual_rate`
+    [1/s] is that of a run of usual length, see `limit_rate`.
     """
 
     elements: Sequence[Element]
@@ -45,6 +53,7 @@ class Plant(RecordedPlant[RecordedData]):
     own: Sequence[str] = ()
     label: str = ""
     fixed: Sequence[FixedNumber] = ()
+    usual_rate: float = np.inf
     accuracy: Accuracy = field(default_factory=Accuracy)
 
     @cached_property
@@ -67,6 +76,18 @@ class Plant(RecordedPlant[RecordedData]):
             table: {str(one[1]) for one in keys if one[0] == table}
             for table in ("inputs", "outputs", "levels")
         }
+
+    def limit_rate(self, point: ParameterVector, time: FloatArray) -> Self:
+        """Return the plant whose usual rate is that of the motion at `point`, or of the grid
+        `time` (N,) [s] where that is faster."""
+        rate = self._find_rate(self.compute_tables(point)["elements"])
+        return replace(self, usual_rate=max(rate, 1.0 / float(np.median(np.diff(time)))))
+
+    def _find_rate(self, elements: Sequence[Element]) -> float:
+        """Find the fastest rate [1/s] of a network; 0 where it has no linear system."""
+        with suppress(InputError):
+            return find_fastest_rate(elements, self.start.locked)
+        return 0.0
 
     def get_start_name(self, name: str) -> str:
         """Return the unknown of the start of a node or shaft."""
@@ -104,9 +125,23 @@ class Plant(RecordedPlant[RecordedData]):
         for name in self._channels["levels"].difference(inputs):
             level = float(tables["levels"][name])
             every[name] = make_input(name, level, (float(time[0]), float(time[-1])))
+        if np.isfinite(self.usual_rate):
+            self._charge_rate(tables["elements"])
         start = Start(tables["speeds"], tables["twists"], self.start.locked)
         outputs = list(self.outputs.values())
         return NetworkTask(tables["elements"], every, start, time, outputs, self.accuracy)
+
+    def _charge_rate(self, elements: Sequence[Element]) -> None:
+        """Count the work of a run that is faster than usual.
+
+        Raises InputError for a motion that is faster than a recording can show.
+        """
+        is_derived = any(isinstance(one, Variable) for one in list_variables(elements))
+        ratio = self._find_rate(elements) / self.usual_rate
+        if ratio > RATE.largest:
+            what = f"a motion is {ratio:.3g} times as fast as the first guess and the sampling"
+            raise InputError(what, "correct the stiffness, damping or inertia that is out of range")
+        charge((EXPANSION if is_derived else RUN) * RATE.work * ratio)
 
     def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
         """Return the delay [s] of each of `inputs` at `point`."""
@@ -162,6 +197,19 @@ class Plant(RecordedPlant[RecordedData]):
         return numbers.tables
 
 
+@dataclass(frozen=True)
+class RateSettings:
+    """Settings of runs with a fast motion, by its rate over the usual one."""
+
+    largest: float = 30.0
+    """Ratio from which the recording does not show the motion: it fades in a thirtieth of a sample,
+    and of the fastest motion at the first guess [ratio]."""
+    work: float = 0.2
+    """Work of a run by this ratio, beside that of a usual run: measured for twelve unknowns
+    [passes]."""
+
+
+RATE = RateSettings()
 _SHARE = 1e-6
 """Step of a difference of runs over an unknown, or over the deviation of a fixed number [ratio].
 

@@ -17,7 +17,7 @@ from drivetwin.fit.omissions import ShownOmission, complete_model
 from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.release import release_fixed
 from drivetwin.fit.unknown import SoughtNumber
-from drivetwin.likelihood.budget import BudgetExceeded, limit_evaluations
+from drivetwin.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
 from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
 from drivetwin.likelihood.point import ParameterVector
 from drivetwin.likelihood.search import (
@@ -25,7 +25,6 @@ from drivetwin.likelihood.search import (
     Attempts,
     RefinedStart,
     expect_inputs,
-    is_near,
     refine_draws,
 )
 
@@ -99,8 +98,7 @@ def search(
     spread = np.zeros(start.values.size)
     spread[: len(sought)] = [_get_spread(one) for one in sought]
     with suppress(BudgetExceeded), limit_evaluations(FIT_SEARCH.work) as budget:
-        if is_near(coarse, start):
-            attempts.refine(start)
+        attempts.refine(start)
         with scale_progress(0.0, 0.56):
             if not _is_explained(attempts.chi2, coarse.size):
                 for _ in refine_draws(attempts, start, spread, seed):
@@ -113,15 +111,34 @@ def search(
         )
     with scale_progress(0.58, 1.0):
         best = _polish(problem, attempts.best.point)
-        best, moved = release_fixed(best, fixed, len(sought))
-        complete = complete_model(best, stated)
-        best, shown = complete.result, complete.shown
-        chi2 = best.normal.cost / problem.size
-        is_limited = budget.left < 0.0 and not _is_explained(chi2, problem.size)
-        best = best if is_limited else expect_inputs(best.problem, best) or best
-        beside = (*moved, *(one.number for one in shown))
-        starts, agreeing = tuple(attempts.starts), attempts.agreeing
-        return FoundMinimum(best, starts, agreeing, is_limited, beside, shown, complete.spread)
+        is_limited = budget.left < 0.0
+        found = FoundMinimum(best, tuple(attempts.starts), attempts.agreeing, is_limited)
+        work = MAX_REFIT_WORK if _is_far(best.normal.cost, problem.size) else np.inf
+        with suppress(BudgetExceeded), limit_evaluations(work):
+            return _complete(found, fixed, len(sought), stated)
+        return found
+
+
+def _complete(
+    found: FoundMinimum, fixed: Sequence[FixedNumber], count: int, stated: Collection[str]
+) -> FoundMinimum:
+    """Minimise over the fixed numbers and the omissions as well, from the minimum over `count`
+    unknowns of the network."""
+    best, moved = release_fixed(found.result, fixed, count)
+    complete = complete_model(best, stated)
+    best, shown = complete.result, complete.shown
+    size = best.problem.size
+    is_limited = found.is_limited and not _is_explained(best.normal.cost / size, size)
+    best = best if is_limited else expect_inputs(best.problem, best) or best
+    beside = (*moved, *(one.number for one in shown))
+    return replace(
+        found,
+        result=best,
+        is_limited=is_limited,
+        fixed=beside,
+        shown=shown,
+        spread=complete.spread,
+    )
 
 
 def _coarsen(problem: Problem) -> Problem:
@@ -139,14 +156,26 @@ def _is_explained(chi2: float, size: int) -> bool:
     return chi2 < 1.0 + 3.0 * float(np.sqrt(2.0 / size))
 
 
+def _is_far(cost: float, size: int) -> bool:
+    """Return whether Q of a point is not near the measurement."""
+    return not cost < SEARCH.near_chi2 * size
+
+
 def _polish(problem: Problem, point: ParameterVector) -> OptimizeResult[Problem]:
-    """Minimise from a point near the minimum, with the weighting recomputed there."""
-    found = minimise(problem.update_weighting(point), point)
+    """Minimise from the best point of the search, with the weighting recomputed there.
+
+    One that is not near the measurement is no estimate, whatever its last digits.
+    """
+    weighted = problem.update_weighting(point)
+    is_far = _is_far(weighted.cost(point), problem.size)
+    found = minimise(weighted, point, rough=is_far)
     if found is None:
         raise IdentificationError(
             "the simulation fails beside its best start",
             "state priors that keep the unknowns where the driveline can be simulated",
         )
+    if _is_far(found.normal.cost, problem.size):
+        return found
     again = found.problem.update_weighting(found.point)
     return minimise(again, found.point) or found
 

@@ -195,6 +195,21 @@ def linearise(
     )
 
 
+def find_fastest_rate(elements: Sequence[Element], locked: Sequence[str]) -> float:
+    """Find the largest magnitude of an eigenvalue [1/s], with plays in contact.
+
+    It is 0 where nothing moves. Raises InputError as `linearise` does.
+    """
+    closed = [
+        {key: one[key] for key in one if key != "gap"} | {"type": "spring_damper"}
+        if one["type"] == "backlash"
+        else one
+        for one in elements
+    ]
+    values = linearise(closed, locked).compute_eigenvalues()
+    return float(np.abs(values).max(initial=0.0))
+
+
 def _check(locked: Sequence[str], points: Mapping[str, Slip]) -> None:
     """Raise InputError for an element that is both locked and slipping."""
     both = [name for name in points if name in locked]

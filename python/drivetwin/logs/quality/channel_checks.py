@@ -19,7 +19,13 @@ from drivetwin._util.arrays import (
     remember_for_arrays,
 )
 from drivetwin._util.display_units import format_with_unit
-from drivetwin.channels.roles import AUXILIARY, Quantity, format_channel_entry
+from drivetwin.channels.roles import (
+    AUXILIARY,
+    EXTRA_ROLES,
+    ROLES,
+    Quantity,
+    format_channel_entry,
+)
 from drivetwin.channels.shiftlog import Channel, FloatArray
 from drivetwin.channels.units import BAR, RPM, find_unit, list_usual_units
 from drivetwin.errors import DamagedChannelError, PlausibilityError, TimeError, Where
@@ -449,6 +455,10 @@ def _format_reversed(channel: Channel) -> str:
 
 
 def _check_sign(channel: Channel, where: Where) -> None:
+    """Raise PlausibilityError for a sign that is wrong by convention.
+
+    Forward motion is positive in a vehicle; a node of any other driveline may turn backwards.
+    """
     if channel.quantity is Quantity.PRESSURE:
         lowest, highest = float(channel.values.min()), float(channel.values.max())
         if -lowest > max(highest, LEAST_SUCTION):
@@ -460,6 +470,7 @@ def _check_sign(channel: Channel, where: Where) -> None:
             )
     if (
         channel.quantity is Quantity.SPEED
+        and channel.role in (*ROLES, *EXTRA_ROLES)
         and 2 * np.count_nonzero(channel.values < 0.0) > channel.values.size
     ):
         raise PlausibilityError(
