@@ -209,14 +209,14 @@ def _find_fault(
     rows: FloatArray,
 ) -> str:
     """Return the reason against a shift, empty where there is none."""
-    if frozenset(gears) not in card.levers:
+    levers = card.levers.get(frozenset(gears))
+    if levers is None:
         return "the card has no [[changes]] for these gears"
     if change - time[0] < _LEAST_BEFORE or time[-1] - change < _LEAST_AFTER:
         return f"{change - time[0]:.2f} s before and {time[-1] - change:.2f} s after the change"
-    needed = (*SPEEDS, "engine_torque")
-    if not all(np.all(np.isfinite(held[role][rows])) for role in needed):
-        return "samples are missing"
-    return ""
+    needed = (*SPEEDS, "engine_torque", *map(make_command_role, (*levers, card.lockup)))
+    missing = [one for one in needed if one in held and not np.isfinite(held[one][rows]).all()]
+    return f"numbers are missing in {', '.join(missing)}" if missing else ""
 
 
 def _make_shift(
@@ -233,7 +233,8 @@ def _make_shift(
     levers = card.levers[frozenset(gears)]
     lockup = held.get(make_command_role(card.lockup))
     is_used = lockup is not None and bool(np.max(lockup[rows]) > 0.0)
-    oil = held.get(_OIL)
+    oil = held[_OIL][rows] if _OIL in held else np.empty(0)
+    oil = oil[np.isfinite(oil)]
     return ControllerShift(
         number=number,
         gears=(gears[0], gears[1]),
@@ -246,7 +247,7 @@ def _make_shift(
         commands={name: held[make_command_role(name)][rows] for name in levers},
         lockup=lockup[rows] if is_used and lockup is not None else None,
         change=float(time[at]) - begin,
-        oil=REFERENCE_OIL if oil is None else float(np.mean(oil[rows])) - zero_Celsius,
+        oil=float(np.mean(oil)) - zero_Celsius if oil.size else REFERENCE_OIL,
     )
 
 

@@ -39,6 +39,7 @@ from drivetwin.logs.formats.table_head import (
     open_text,
 )
 from drivetwin.logs.formats.table_scan import (
+    Contents,
     Numbers,
     TableReader,
     list_contents,
@@ -196,7 +197,7 @@ class CsvRecording:
         self, time: _TimeColumns, numbers: dict[int, Numbers]
     ) -> tuple[dict[int, _Stamps], tuple[str, ...]]:
         for clock in numbers:
-            time.require_numbers(clock, self._contents[clock].fault)
+            time.require_numbers(clock, self._contents[clock])
         if len(numbers) == 1:
             return time.count_single(numbers)
         stamps, notices = time.count_several(numbers)
@@ -268,11 +269,13 @@ class _TimeColumns:
         }
         return stamps, (note, *describe_origin(origin))
 
-    def require_numbers(self, clock: int, fault: str | None) -> None:
+    def require_numbers(self, clock: int, contents: Contents) -> None:
         """Raise TimeError where a time column holds something else than numbers."""
-        if fault is not None:
+        if contents.fault is not None:
             remedy = "export time as seconds since the start of the recording"
-            raise TimeError(f"no time stamp: {fault}", remedy, self._place(clock))
+            if contents.count:
+                remedy = f"remove that line if it is a summary or another table, or {remedy}"
+            raise TimeError(f"no time stamp: {contents.fault}", remedy, self._place(clock))
 
     def require_stamps(self, column: int, bare: NDArray[np.bool_]) -> None:
         """Raise TimeError for the first row that is `bare` (n,) of a stamp."""

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Logs of a gearbox control with missing numbers give their other shifts, or the reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from drivetwin.cli import main
+from drivetwin.tcu.card import load_controller_card
+from drivetwin.tcu.log import REFERENCE_OIL, ControllerLog, read_controller_log
+
+
+def _read(folder: Path, column: str, begin: float, end: float) -> ControllerLog:
+    """Read a made log without the numbers of a column from `begin` to `end` [s]."""
+    path = folder / "control.csv"
+    assert main(["synth", "--scenario", "controller_log", "-o", str(path)]) == 0
+    names, units, *rows = (line.split(",") for line in path.read_text("utf-8").splitlines())
+    for row in rows:
+        if begin <= float(row[0]) < end:
+            row[names.index(column)] = "NaN"
+    text = "\n".join(",".join(row) for row in (names, units, *rows)) + "\n"
+    path.write_text(text, "utf-8")
+    return read_controller_log(path, load_controller_card(path.with_suffix(".card.toml")))
+
+
+def test_a_shift_whose_command_is_missing_is_left_out_with_its_channel(tmp_path: Path) -> None:
+    log = _read(tmp_path, "p_K1_cmd", 1.5, 1.7)
+    assert log.left_out == ("1.00 s, 1-2: numbers are missing in pressure_command.K1",)
+    assert len(log.shifts) == 11
+
+
+@pytest.mark.parametrize("end", [1.7, 1e9])
+def test_a_missing_oil_temperature_is_that_of_the_other_rows_or_the_usual_one(
+    tmp_path: Path, end: float
+) -> None:
+    log = _read(tmp_path, "T_oil", 0.5, end)
+    assert log.left_out == ()
+    assert (log.shifts[-1].oil == REFERENCE_OIL) is (end > 1e3)
+    assert 30.0 < log.shifts[0].oil < 90.0
