@@ -12,6 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
 
+from drivetwin.channels import knot_fit
 from drivetwin.channels.roles import ReadOptions, TimeColumn
 from drivetwin.logs.raw import RawChannel
 from drivetwin.logs.read import read_raw
@@ -350,3 +351,13 @@ def test_a_long_record_filled_by_lines_is_found_by_its_windows() -> None:
     assert found is not None
     assert found.interpolation.name == "LINEAR"
     assert found.period == pytest.approx(0.01, rel=1e-6)
+
+
+def test_no_knots_are_sought_under_a_noise_that_hides_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A profile of straight lines over 1.5 s at 100 Hz, measured with noise of three roundings."""
+    rng = np.random.default_rng(9)
+    time = 0.01 * np.arange(8192)
+    profile = np.interp(time, 1.5 * np.arange(60), rng.normal(15.0, 45.0, 60))
+    values = np.round(profile + 0.3 * rng.standard_normal(time.size), 1)
+    monkeypatch.setattr(knot_fit, "_refine_raster", lambda *_: pytest.fail("a search"))
+    assert find_filling(time, values) is None

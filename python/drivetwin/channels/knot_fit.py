@@ -31,6 +31,8 @@ _SEARCHED = 1e-4
 """Misfit over that half a period away which the search for the instants of knots may leave."""
 _ROUND_OFF = 1e-12
 """Misfit over the largest value that is round-off of an interpolation."""
+_BEND, _BEND_SQUARES = 5, 70.0
+"""Rows of a fourth difference, which is 0 on a cubic, and the sum of its squared weights."""
 _FREE = 0.1
 """Least share of rows beyond the unknowns of a fit."""
 
@@ -104,7 +106,7 @@ def find_raster_of_knots(
         None where no raster explains the record better than chance.
     """
     step = float(time[-1] - time[0]) / (time.size - 1)
-    for period in periods:
+    for period in _list_possible(values, periods, step, resolution):
         rows = int(max(_ROWS, 2 * _PARTS * period / step))
         first = max((time.size - rows) // 2, 0)
         part = slice(first, first + rows)
@@ -117,6 +119,26 @@ def find_raster_of_knots(
         if passed:
             return min(passed, key=lambda one: fit_knots(time[part], values[part], one).size)
     return None
+
+
+def _list_possible(
+    values: FloatArray, periods: Sequence[float], step: float, resolution: float
+) -> list[float]:
+    """List the periods whose pieces, of a cubic each, may lie under the roughness of a record.
+
+    The fourth difference of rows within a piece is that of their errors. So many runs of rows do
+    not pass a knot; half of them are below the root mean square.
+    """
+    error = max(_round_knots(resolution), _SEARCHED * float(np.std(values)))
+    bends = np.abs(np.diff(values, _BEND - 1))
+    within = np.array([max(1.0 - (_BEND - 1) * step / period, 0.0) for period in periods])
+    smooth = np.quantile(bends, 0.5 * within) < np.sqrt(_BEND_SQUARES) * error
+    return [one for one, can in zip(periods, smooth | (within <= 0.0), strict=True) if can]
+
+
+def _round_knots(resolution: float) -> float:
+    """Return the root mean square of the rounding of rows and of knots."""
+    return float(np.sqrt((1.0 + _KNOT_ROUNDING) / 12.0) * resolution)
 
 
 def _list_rasters(
@@ -196,7 +218,7 @@ def _weigh_raster(
     interpolant explains more of most parts, the knots are not the samples.
     """
     mine, other = _measure_parts(time, values, raster)
-    rounding = np.sqrt((1.0 + _KNOT_ROUNDING) / 12.0) * resolution
+    rounding = _round_knots(resolution)
     usual = float(np.nanmedian(other))
     if not np.nanmedian(mine) < max(rounding, _SEARCHED * usual) < usual:
         return 0.0
