@@ -127,7 +127,7 @@ def test_leaves_measured_samples_alone(seed: int, step: float, rate: int) -> Non
     time = np.arange(0.0, 5.0, rate * STEP)
     values = measure_speed(time, seed)
     values = np.round(values / step) * step if step else values
-    assert find_filling(time, values) is None
+    assert find_filling(time, np.asarray(values)) is None
 
 
 @pytest.mark.parametrize(
@@ -238,7 +238,7 @@ def test_rounding_makes_no_lines(step: float, rate: int) -> None:
     for seed, noise in enumerate((0.1, 0.3, 1.0)):
         speed = measure_speed(time, seed, noise) + 5.0 * time**2
         values = np.round(speed / step) * step
-        assert find_filling(time, values) is None
+        assert find_filling(time, np.asarray(values)) is None
 
 
 def test_ramps_without_noise_are_not_filled() -> None:
@@ -360,4 +360,4 @@ def test_no_knots_are_sought_under_a_noise_that_hides_them(monkeypatch: pytest.M
     profile = np.interp(time, 1.5 * np.arange(60), rng.normal(15.0, 45.0, 60))
     values = np.round(profile + 0.3 * rng.standard_normal(time.size), 1)
     monkeypatch.setattr(knot_fit, "_refine_raster", lambda *_: pytest.fail("a search"))
-    assert find_filling(time, values) is None
+    assert find_filling(time, np.asarray(values)) is None
