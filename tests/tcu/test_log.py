@@ -12,14 +12,14 @@ from drivetwin.tcu.card import load_controller_card
 from drivetwin.tcu.log import REFERENCE_OIL, ControllerLog, read_controller_log
 
 
-def _read(folder: Path, column: str, begin: float, end: float) -> ControllerLog:
-    """Read a made log without the numbers of a column from `begin` to `end` [s]."""
+def _read(folder: Path, column: str, begin: float, end: float, cell: str = "NaN") -> ControllerLog:
+    """Read a made log with a `cell` in a column from `begin` to `end` [s], by default no number."""
     path = folder / "control.csv"
     assert main(["synth", "--scenario", "controller_log", "-o", str(path)]) == 0
     names, units, *rows = (line.split(",") for line in path.read_text("utf-8").splitlines())
     for row in rows:
         if begin <= float(row[0]) < end:
-            row[names.index(column)] = "NaN"
+            row[names.index(column)] = cell
     text = "\n".join(",".join(row) for row in (names, units, *rows)) + "\n"
     path.write_text(text, "utf-8")
     return read_controller_log(path, load_controller_card(path.with_suffix(".card.toml")))
@@ -27,8 +27,17 @@ def _read(folder: Path, column: str, begin: float, end: float) -> ControllerLog:
 
 def test_a_shift_whose_command_is_missing_is_left_out_with_its_channel(tmp_path: Path) -> None:
     log = _read(tmp_path, "p_K1_cmd", 1.5, 1.7)
-    assert log.left_out == ("1.00 s, 1-2: numbers are missing in pressure_command.K1",)
+    assert log.left_out == ("1.00 s, 1-2: missing or damaged numbers of pressure_command.K1",)
     assert len(log.shifts) == 11
+
+
+@pytest.mark.parametrize(("column", "cell"), [("n_output", "16383"), ("n_turbine", "0")])
+def test_a_speed_that_spikes_or_drops_out_is_no_measured_one(
+    tmp_path: Path, column: str, cell: str
+) -> None:
+    log = _read(tmp_path, column, 1.99, 2.03, cell)
+    role = {"n_output": "output_speed", "n_turbine": "input_speed"}[column]
+    assert log.left_out == (f"1.00 s, 1-2: missing or damaged numbers of {role}",)
 
 
 @pytest.mark.parametrize("end", [1.7, 1e9])

@@ -18,6 +18,7 @@ from drivetwin.channels.roles import (
     FOR_CONTROL,
     ChannelSpec,
     Column,
+    Quantity,
     get_quantity,
     make_command_role,
 )
@@ -25,6 +26,7 @@ from drivetwin.channels.units import resolve_channel_unit
 from drivetwin.errors import MappingError, MissingChannelError, NoShiftError, Where
 from drivetwin.logs.formats.detect import open_recording
 from drivetwin.logs.quality.channel_checks import check_order
+from drivetwin.logs.quality.outliers import find_dropouts, find_spikes
 from drivetwin.logs.raw import Recording
 from drivetwin.tcu.card import ControllerCard
 
@@ -117,7 +119,8 @@ def _load(
 ) -> tuple[FloatArray, FloatArray]:
     """Load stamps (n,) [s] and values (n,) [SI] of a column as the control wrote them.
 
-    A control writes what it computed with, so that no sample is looked for damage or filling.
+    A control writes what it computed with, so that no sample is looked for filling. Speeds that
+    spike or fall to zero are no numbers.
     """
     picked = [k for k, column in enumerate(recording.columns) if spec.matches(column)]
     where = Where(file=str(path), channel=spec.source)
@@ -127,7 +130,11 @@ def _load(
     raw = recording.load(picked[0])
     unit = resolve_channel_unit(spec.unit or raw.unit, get_quantity(role), where, role)
     values = unit.to_si(spec.sign * (spec.scale * raw.values + spec.offset))
-    return raw.time + spec.time_shift, np.asarray(values)
+    time = raw.time + spec.time_shift
+    if role in SPEEDS:
+        for damage in find_dropouts(time, values), find_spikes(time, values, Quantity.SPEED):
+            values = values if damage is None else np.where(damage.mask, np.nan, values)
+    return time, np.asarray(values)
 
 
 def _find_columns(
@@ -216,7 +223,7 @@ def _find_fault(
         return f"{change - time[0]:.2f} s before and {time[-1] - change:.2f} s after the change"
     needed = (*SPEEDS, "engine_torque", *map(make_command_role, (*levers, card.lockup)))
     missing = [one for one in needed if one in held and not np.isfinite(held[one][rows]).all()]
-    return f"numbers are missing in {', '.join(missing)}" if missing else ""
+    return f"missing or damaged numbers of {', '.join(missing)}" if missing else ""
 
 
 def _make_shift(
