@@ -8,21 +8,31 @@ from pathlib import Path
 import pytest
 
 from drivetwin.cli import main
+from drivetwin.errors import PlausibilityError
 from drivetwin.tcu.card import load_controller_card
 from drivetwin.tcu.log import REFERENCE_OIL, ControllerLog, read_controller_log
 
 
-def _read(folder: Path, column: str, begin: float, end: float, cell: str = "NaN") -> ControllerLog:
-    """Read a made log with a `cell` in a column from `begin` to `end` [s], by default no number."""
+def _write(folder: Path) -> Path:
     path = folder / "control.csv"
     assert main(["synth", "--scenario", "controller_log", "-o", str(path)]) == 0
+    return path
+
+
+def _load(path: Path) -> ControllerLog:
+    return read_controller_log(path, load_controller_card(path.with_suffix(".card.toml")))
+
+
+def _read(folder: Path, column: str, begin: float, end: float, cell: str = "NaN") -> ControllerLog:
+    """Read a made log with a `cell` in a column from `begin` to `end` [s], by default no number."""
+    path = _write(folder)
     names, units, *rows = (line.split(",") for line in path.read_text("utf-8").splitlines())
     for row in rows:
         if begin <= float(row[0]) < end:
             row[names.index(column)] = cell
     text = "\n".join(",".join(row) for row in (names, units, *rows)) + "\n"
     path.write_text(text, "utf-8")
-    return read_controller_log(path, load_controller_card(path.with_suffix(".card.toml")))
+    return _load(path)
 
 
 def test_a_shift_whose_command_is_missing_is_left_out_with_its_channel(tmp_path: Path) -> None:
@@ -38,6 +48,14 @@ def test_a_speed_that_spikes_or_drops_out_is_no_measured_one(
     log = _read(tmp_path, column, 1.99, 2.03, cell)
     role = {"n_output": "output_speed", "n_turbine": "input_speed"}[column]
     assert log.left_out == (f"1.00 s, 1-2: missing or damaged numbers of {role}",)
+
+
+def test_commands_in_another_unit_are_refused_with_the_unit_that_fits(tmp_path: Path) -> None:
+    path = _write(tmp_path)
+    path.write_text(path.read_text("utf-8").replace("mbar", "bar"), "utf-8")
+    with pytest.raises(PlausibilityError, match="above 100") as refusal:
+        _load(path)
+    assert 'unit = "hPa"' in refusal.value.remedy
 
 
 @pytest.mark.parametrize("end", [1.7, 1e9])

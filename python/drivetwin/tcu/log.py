@@ -22,10 +22,11 @@ from drivetwin.channels.roles import (
     get_quantity,
     make_command_role,
 )
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.channels.units import resolve_channel_unit
 from drivetwin.errors import MappingError, MissingChannelError, NoShiftError, Where
 from drivetwin.logs.formats.detect import open_recording
-from drivetwin.logs.quality.channel_checks import check_order
+from drivetwin.logs.quality.channel_checks import check_magnitude, check_order
 from drivetwin.logs.quality.outliers import find_dropouts, find_spikes
 from drivetwin.logs.raw import Recording
 from drivetwin.tcu.card import ControllerCard
@@ -95,6 +96,8 @@ def read_controller_log(
     ------
     MissingChannelError, MappingError
         Where a needed column is missing or not unique.
+    PlausibilityError
+        Where a column is in another unit.
     NoShiftError
         Where no shift has the rows that a fit needs, with the reasons.
     """
@@ -134,6 +137,12 @@ def _load(
     if role in SPEEDS:
         for damage in find_dropouts(time, values), find_spikes(time, values, Quantity.SPEED):
             values = values if damage is None else np.where(damage.mask, np.nan, values)
+    quantity, known = get_quantity(role), np.isfinite(values)
+    channel = Channel(
+        role, quantity, time[known], values[known], raw.name, spec.unit or raw.unit or ""
+    )
+    if known.any():
+        check_magnitude(channel, where)
     return time, np.asarray(values)
 
 

@@ -146,7 +146,7 @@ def check_channel(channel: Channel, file: str) -> tuple[Channel, list[Finding]]:
         if applies(channel):
             channel = _drop_damage(channel, look(channel), findings)
             _check_count(channel, total, where)
-    _check_magnitude(channel, where)
+    check_magnitude(channel, where)
     _check_sign(channel, where)
     _check_wraps(channel, where)
     findings += _check_limit(channel)
@@ -417,7 +417,8 @@ def _check_variation(channel: Channel, where: Where) -> None:
         )
 
 
-def _check_magnitude(channel: Channel, where: Where) -> None:
+def check_magnitude(channel: Channel, where: Where) -> None:
+    """Raise PlausibilityError for a largest number that no shift log has, with the unit it fits."""
     if channel.quantity not in _PLAUSIBLE:
         return
     lowest, highest = _PLAUSIBLE[channel.quantity]
