@@ -22,7 +22,6 @@ from drivetwin.channels.roles import (
     get_quantity,
     make_command_role,
 )
-from drivetwin.channels.shiftlog import Channel
 from drivetwin.channels.units import resolve_channel_unit
 from drivetwin.errors import MappingError, MissingChannelError, NoShiftError, Where
 from drivetwin.logs.formats.detect import open_recording
@@ -138,11 +137,8 @@ def _load(
         for damage in find_dropouts(time, values), find_spikes(time, values, Quantity.SPEED):
             values = values if damage is None else np.where(damage.mask, np.nan, values)
     quantity, known = get_quantity(role), np.isfinite(values)
-    channel = Channel(
-        role, quantity, time[known], values[known], raw.name, spec.unit or raw.unit or ""
-    )
     if known.any():
-        check_magnitude(channel, where)
+        check_magnitude(role, quantity, values[known], spec.unit or raw.unit or "", where)
     return time, np.asarray(values)
 
 

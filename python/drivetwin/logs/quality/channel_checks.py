@@ -146,7 +146,8 @@ def check_channel(channel: Channel, file: str) -> tuple[Channel, list[Finding]]:
         if applies(channel):
             channel = _drop_damage(channel, look(channel), findings)
             _check_count(channel, total, where)
-    check_magnitude(channel, where)
+    magnitude = channel.role, channel.quantity, channel.values, channel.source_unit
+    check_magnitude(*magnitude, where)
     _check_sign(channel, where)
     _check_wraps(channel, where)
     findings += _check_limit(channel)
@@ -417,35 +418,37 @@ def _check_variation(channel: Channel, where: Where) -> None:
         )
 
 
-def check_magnitude(channel: Channel, where: Where) -> None:
+def check_magnitude(
+    role: str, quantity: Quantity, values: FloatArray, unit: str, where: Where
+) -> None:
     """Raise PlausibilityError for a largest number that no shift log has, with the unit it fits."""
-    if channel.quantity not in _PLAUSIBLE:
+    if quantity not in _PLAUSIBLE:
         return
-    lowest, highest = _PLAUSIBLE[channel.quantity]
-    if channel.role in _DRIVING:
-        unit = find_unit(channel.source_unit)
+    lowest, highest = _PLAUSIBLE[quantity]
+    if role in _DRIVING:
+        known = find_unit(unit)
         lowest = _IDLE
-        highest = _FASTEST if unit is not None and unit.factor == RPM else highest
-    largest = find_largest(channel.values)
+        highest = _FASTEST if known is not None and known.factor == RPM else highest
+    largest = find_largest(values)
     if largest == 0.0 or lowest <= largest <= highest:
         return
-    low, high = _TYPICAL[channel.quantity]
+    low, high = _TYPICAL[quantity]
     fitting = {
         name: abs(np.log(factor * largest / np.sqrt(low * high)))
-        for name, factor in list_usual_units(channel.quantity, channel.source_unit)
+        for name, factor in list_usual_units(quantity, unit)
         if low <= factor * largest <= high
     }
     units = sorted(fitting, key=fitting.__getitem__)
     side, limit = ("above", highest) if largest > highest else ("below", lowest)
     remedy = (
         f"the numbers would fit {' or '.join(map(repr, units))}: assert the unit in the channel "
-        f"mapping, {format_channel_entry(channel.role, channel.source_name, unit=units[0])}"
+        f"mapping, {format_channel_entry(role, where.channel or '', unit=units[0])}"
         if units
-        else f"correct unit or scale of channels.{channel.role} in the channel mapping"
+        else f"correct unit or scale of channels.{role} in the channel mapping"
     )
     raise PlausibilityError(
-        f"largest {channel.quantity} is {format_with_unit(largest, channel.quantity.unit)}, {side} "
-        f"{format_with_unit(limit, channel.quantity.unit)}, with unit {channel.source_unit!r}",
+        f"largest {quantity} is {format_with_unit(largest, quantity.unit)}, {side} "
+        f"{format_with_unit(limit, quantity.unit)}, with unit {unit!r}",
         remedy,
         where,
     )
