@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from drivetwin.fit.unknown import Unknown
 from drivetwin.modeling.model import Model
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import Output
+from tests.support.fits import record_run
 
 TRUTH = {"rotor.inertia": 0.8, "fluid.damping": 1.5}
 
@@ -94,3 +96,24 @@ def test_two_levels_of_an_input_are_those_of_a_switch() -> None:
     for name, value in TRUTH.items():
         assert abs(found.values[name] - value) < 3.0 * found.std[name], name
         assert found.std[name] < 0.001 * value, name
+
+
+@pytest.mark.parametrize("sigma", [None, 0.4])
+def test_the_noise_of_a_fast_motion_is_that_of_the_residual(sigma: float | None) -> None:
+    """A mesh swings at 220 Hz, sampled at 2 kHz: its motion counts as noise in the samples."""
+    model = Model("mesh")
+    pinion, wheel = model.inertia("pinion", 0.048), model.inertia("wheel", 0.09)
+    shaft = model.spring_damper("shaft", pinion, wheel, stiffness=6e4, damping=0.3)
+    model.start({pinion: 50.0, wheel: 50.0}, twists={shaft: 2e-3})
+    outputs = {"pinion": pinion.speed, "wheel": wheel.speed}
+    run = model.simulate(np.arange(0.0, 0.3, 5e-4))
+    made = record_run(run, {}, outputs, dict.fromkeys(outputs, 0.02))
+    recording = replace(
+        made, outputs={name: replace(one, sigma=sigma) for name, one in made.outputs.items()}
+    )
+    assert made.outputs["pinion"].get_noise() > 0.05
+    unknowns = {"shaft.stiffness": Unknown(5e4, 2e4), "shaft.damping": Unknown(0.5, 0.3)}
+    found = model.fit(recording, unknowns, outputs)
+    noise = found.problem.terms[0].record.outputs[0].sigma
+    assert noise == (pytest.approx(0.02, rel=0.2) if sigma is None else sigma)
+    assert abs(found.values["shaft.damping"] - 0.3) < 4.0 * found.std["shaft.damping"]

@@ -41,7 +41,11 @@ def read_recording(
     inputs = {name: Signal(signals[name].time, signals[name].values) for name in channels.inputs}
     outputs = {
         name: Measured(
-            one.time, one.values, channels.sigma.get(name, one.sigma), channels.samples[name]
+            one.time,
+            one.values,
+            channels.sigma.get(name, one.sigma),
+            channels.samples[name],
+            is_estimated=name not in channels.sigma,
         )
         for name in channels.outputs
         for one in [signals[name]]

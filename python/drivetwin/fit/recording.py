@@ -14,7 +14,11 @@ import numpy as np
 from drivetwin._util.arrays import FloatArray, estimate_rounding_step
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.likelihood.input_smoothing import select_windows, smooth_windows
-from drivetwin.likelihood.measured_signal import MeasuredSignal, estimate_white_noise
+from drivetwin.likelihood.measured_signal import (
+    MeasuredSignal,
+    estimate_noise,
+    estimate_white_noise,
+)
 from drivetwin.likelihood.output import Output
 from drivetwin.likelihood.recorded_data import RECORD, RecordedData, fill_grid
 from drivetwin.likelihood.sample_noise import Quantization, estimate_quantization
@@ -22,6 +26,9 @@ from drivetwin.simulation.dual_clutch import Signal
 
 _MIN_SAMPLES = 20
 """Fewest samples of a compared quantity."""
+_QUIETER = 0.9
+"""Noise of a residual over its estimate below which the estimate was too large: estimates from 200
+samples differ by 10 % by chance [ratio]."""
 _LEAST_LEVELS = 3
 """Fewest levels of a rounded quantity."""
 
@@ -40,14 +47,16 @@ class Measured:
     """Measured quantity: `values` (n,) at `time` (n,) [s], SI.
 
     `sigma` is the standard deviation of the white noise of a sample; estimated from the record
-    where it is None. The first of `samples` that are means covers time before the recording, and is
-    not compared.
+    where it is None. A fast motion raises an estimate; a fit lowers one, also a `sigma` that
+    `is_estimated`, to the noise of its residual. The first of `samples` that are means covers time
+    before the recording, and is not compared.
     """
 
     time: FloatArray
     values: FloatArray
     sigma: float | None = None
     samples: Samples = Samples.INSTANT
+    is_estimated: bool = False
 
     def __post_init__(self) -> None:
         for name in ("time", "values"):  # lists and series are taken as well
@@ -58,17 +67,24 @@ class Measured:
         place = np.searchsorted(time, self.time)
         rounding = self.find_rounding()
         found = Output(name, place, self.values, self.get_noise(), rounding=rounding)
+        if (self.sigma is None or self.is_estimated) and rounding is None:
+            found = replace(found, least_sigma=self._get_least_noise())
         if self.samples is Samples.INSTANT:
             return found
         return found.drop_first_period(time).convert_to_means(time)
 
     def get_noise(self) -> float:
         """Return the noise of a sample, at least that of an ideal sensor."""
-        least = RECORD.min_noise * float(np.ptp(self.values))
-        found = self.sigma
-        if found is None:
-            found = max(estimate_white_noise(self.values), self._find_step() / np.sqrt(12.0))
-        return float(max(found, least, np.finfo(float).tiny))
+        if self.sigma is None:
+            return max(estimate_white_noise(self.values), self._get_least_noise())
+        return max(self.sigma, self._get_least_spread())
+
+    def _get_least_noise(self) -> float:
+        """Return the noise of rounding, at least that of an ideal sensor."""
+        return max(float(self._find_step() / np.sqrt(12.0)), self._get_least_spread())
+
+    def _get_least_spread(self) -> float:
+        return max(RECORD.min_noise * float(np.ptp(self.values)), float(np.finfo(float).tiny))
 
     def compute_variance(self) -> FloatArray:
         """Compute the variance (n,) of white samples with the power of noise and rounding."""
@@ -220,6 +236,22 @@ def build_network_record(
         fast,
         windows,
     )
+
+
+def lower_noise(record: RecordedData, residual: FloatArray) -> RecordedData:
+    """Return a record whose estimates of noise are at most those of the residual (n,) of a fit.
+
+    The motion, which counts as noise where it is fast, is not in the residual.
+    """
+    ends = np.cumsum([out.values.size for out in record.outputs])
+    parts = zip(record.outputs, np.split(residual, ends[:-1]), strict=True)
+    outputs = [_lower_sigma(out, record.time[out.place], own) for out, own in parts]
+    return replace(record, outputs=tuple(outputs))
+
+
+def _lower_sigma(out: Output, time: FloatArray, residual: FloatArray) -> Output:
+    sigma = max(estimate_noise(time, residual), out.least_sigma)
+    return replace(out, sigma=sigma) if sigma < _QUIETER * out.sigma else out
 
 
 def _require_channels(recording: Recording, outputs: Sequence[str]) -> None:

@@ -15,6 +15,7 @@ from drivetwin.errors import IdentificationError
 from drivetwin.fit.fixed_numbers import FixedNumber
 from drivetwin.fit.omissions import ShownOmission, complete_model
 from drivetwin.fit.plant import NetworkTerm, Problem
+from drivetwin.fit.recording import lower_noise
 from drivetwin.fit.release import release_fixed
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
@@ -93,30 +94,41 @@ def search(
     IdentificationError
         Where no draw can be simulated, or no start leads to a minimum.
     """
-    coarse = _coarsen(problem)
-    attempts = Attempts(coarse)
     spread = np.zeros(start.values.size)
     spread[: len(sought)] = [_get_spread(one) for one in sought]
+    with scale_progress(0.0, 0.58):
+        found = _seek(problem, start, spread, seed)
+    with scale_progress(0.58, 1.0):
+        first, found = found, _lower_estimates(found)
+        best = found.result
+        if found is not first and not _is_explained(best.normal.cost / problem.size, problem.size):
+            again = _seek(best.problem, start, spread, seed)
+            if again.result.normal.cost < best.normal.cost:
+                found = _lower_estimates(again)
+        is_far = _is_far(found.result.normal.cost, problem.size)
+        work = MAX_REFIT_WORK if is_far else np.inf
+        with suppress(BudgetExceeded), limit_evaluations(work):
+            return _complete(found, fixed, len(sought), stated)
+        return found
+
+
+def _seek(problem: Problem, start: ParameterVector, spread: FloatArray, seed: int) -> FoundMinimum:
+    """Find the minimum over the unknowns, from the first guess and from draws about it."""
+    coarse = _coarsen(problem)
+    attempts = Attempts(coarse)
     with suppress(BudgetExceeded), limit_evaluations(FIT_SEARCH.work) as budget:
         attempts.refine(start)
-        with scale_progress(0.0, 0.56):
-            if not _is_explained(attempts.chi2, coarse.size):
-                for _ in refine_draws(attempts, start, spread, seed):
-                    if _is_explained(attempts.chi2, coarse.size):
-                        break
+        if not _is_explained(attempts.chi2, coarse.size):
+            for _ in refine_draws(attempts, start, spread, seed):
+                if _is_explained(attempts.chi2, coarse.size):
+                    break
     if not attempts.starts:
         raise IdentificationError(
             "the simulation could not be brought onto the recordings from any start",
             "check first guesses, bounds and units against the recordings, and the start speeds",
         )
-    with scale_progress(0.58, 1.0):
-        best = _polish(problem, attempts.best.point)
-        is_limited = budget.left < 0.0
-        found = FoundMinimum(best, tuple(attempts.starts), attempts.agreeing, is_limited)
-        work = MAX_REFIT_WORK if _is_far(best.normal.cost, problem.size) else np.inf
-        with suppress(BudgetExceeded), limit_evaluations(work):
-            return _complete(found, fixed, len(sought), stated)
-        return found
+    best = _polish(problem, attempts.best.point)
+    return FoundMinimum(best, tuple(attempts.starts), attempts.agreeing, budget.left < 0.0)
 
 
 def _complete(
@@ -178,6 +190,28 @@ def _polish(problem: Problem, point: ParameterVector) -> OptimizeResult[Problem]
         return found
     again = found.problem.update_weighting(found.point)
     return minimise(again, found.point) or found
+
+
+def _lower_estimates(found: FoundMinimum) -> FoundMinimum:
+    """Minimise again while the noise of the residual is less than its estimate."""
+    while (quieter := _lower_noise(found.result)) is not None:
+        found = replace(found, result=_polish(quieter, found.result.point))
+    return found
+
+
+def _lower_noise(found: OptimizeResult[Problem]) -> Problem | None:
+    """Return the problem with the noise that the residual has at a minimum, by the sensors' noise.
+
+    None where it is not less than its estimate from the samples, or the recordings are unexplained.
+    """
+    terms = zip(found.problem.terms, found.normal.residuals, strict=True)
+    if found.normal.cost > found.problem.size:
+        return None
+    records = [(term, lower_noise(term.record, residual)) for term, residual in terms]
+    if all(np.array_equal(term.record.sigma, record.sigma) for term, record in records):
+        return None
+    quieter = [NetworkTerm.from_sensor_noise(term.plant, record) for term, record in records]
+    return replace(found.problem, terms=tuple(quieter))
 
 
 def _get_spread(one: SoughtNumber) -> float:

@@ -22,7 +22,8 @@ class Output:
 
     `sigma` is the white noise of a sample, `rounding` are errors that this noise does not dither.
     With a `window` [s] a sample is the mean over that time before its stamp, as encoders on a bus
-    send it. `centre` (n,) are the points in the middle of what a sample shows.
+    send it. `centre` (n,) are the points in the middle of what a sample shows. `least_sigma` is the
+    noise down to which the residual of a fit may lower `sigma`; infinite where that is stated.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Output:
     window: float = 0.0
     centre: IndexArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     rounding: Quantization | None = None
+    least_sigma: float = np.inf
 
     def __post_init__(self) -> None:
         """Without a window the middle is the stamp."""
