@@ -244,8 +244,8 @@ def lower_noise(record: RecordedData, residual: FloatArray) -> RecordedData:
     The motion, which counts as noise where it is fast, is not in the residual.
     """
     ends = np.cumsum([out.values.size for out in record.outputs])
-    parts = zip(record.outputs, np.split(residual, ends[:-1]), strict=True)
-    outputs = [_lower_sigma(out, record.time[out.place], own) for out, own in parts]
+    pairs = zip(record.outputs, np.split(residual, ends[:-1]), strict=True)
+    outputs = [_lower_sigma(out, record.time[out.place], own) for out, own in pairs]
     return replace(record, outputs=tuple(outputs))
 
 
