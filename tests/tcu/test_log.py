@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.errors import PlausibilityError
+from drivetwin.errors import NoShiftError, PlausibilityError
 from drivetwin.tcu.card import load_controller_card
 from drivetwin.tcu.log import REFERENCE_OIL, ControllerLog, read_controller_log
+from drivetwin.tcu.statements import find_onset
 
 
 def _write(folder: Path) -> Path:
@@ -50,6 +52,15 @@ def test_a_speed_that_spikes_or_drops_out_is_no_measured_one(
     assert log.left_out == (f"1.00 s, 1-2: missing or damaged numbers of {role}",)
 
 
+def test_a_command_that_does_not_change_in_its_shift_is_named(tmp_path: Path) -> None:
+    with pytest.raises(NoShiftError) as refusal:
+        _read(tmp_path, "gear_target", 0.0, 1e9, "1")
+    assert "never changes" in refusal.value.what
+    log = _read(tmp_path, "p_K2_cmd", 0.0, 1e9, "0")
+    assert {one.kind for one in log.shifts} == {"1-2", "3-4"}
+    assert "31.00 s, 2-3: the command of K2 does not change" in log.left_out
+
+
 def test_commands_in_another_unit_are_refused_with_the_unit_that_fits(tmp_path: Path) -> None:
     path = _write(tmp_path)
     path.write_text(path.read_text("utf-8").replace("mbar", "bar"), "utf-8")
@@ -66,3 +77,9 @@ def test_a_missing_oil_temperature_is_that_of_the_other_rows_or_the_usual_one(
     assert log.left_out == ()
     assert (log.shifts[-1].oil == REFERENCE_OIL) is (end > 1e3)
     assert 30.0 < log.shifts[0].oil < 90.0
+
+
+def test_a_pressure_that_never_exceeds_p0_has_no_onset() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    assert np.isnan(find_onset(time, time - 2.0))
+    assert find_onset(time, time - 0.55) == pytest.approx(0.55)

@@ -228,7 +228,10 @@ def _find_fault(
         return f"{change - time[0]:.2f} s before and {time[-1] - change:.2f} s after the change"
     needed = (*SPEEDS, "engine_torque", *map(make_command_role, (*levers, card.lockup)))
     missing = [one for one in needed if one in held and not np.isfinite(held[one][rows]).all()]
-    return f"missing or damaged numbers of {', '.join(missing)}" if missing else ""
+    if missing:
+        return f"missing or damaged numbers of {', '.join(missing)}"
+    still = [one for one in levers if np.ptp(held[make_command_role(one)][rows]) == 0.0]
+    return f"the command of {' and of '.join(still)} does not change" if still else ""
 
 
 def _make_shift(

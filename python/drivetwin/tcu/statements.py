@@ -116,6 +116,10 @@ _VEHICLE = {
     "tyre_slip_stiffness": ("N*m", "torque over slip of the tyres, at the output"),
 }
 """Units and meanings of the numbers of the vehicle that are stated as they are."""
+_NO_TORQUE = (
+    "The pressure does not rise over P0 in a shift in which the element applies. Check column, "
+    "unit and element of its command."
+)
 _SCALE_FREE = "independent of the common scale of all torques"
 
 
@@ -214,7 +218,7 @@ def _list_onsets(given: Values, found: FittedShifts, element: str) -> FloatArray
 
 def compute_onset(given: Values, *, found: FittedShifts, element: str) -> float:
     """Compute the mean time [s] from the change of the commanded gear to the first torque of an
-    element, over the shifts in which it applies."""
+    element, over the shifts in which it applies; NaN if one has no rise of its pressure over P0."""
     return float(np.mean(_list_onsets(given, found, element)))
 
 
@@ -226,10 +230,10 @@ def _compute_rise(given: Values, *, found: FittedShifts, element: str) -> float:
 
 
 def find_onset(time: FloatArray, excess: FloatArray) -> float:
-    """Find the instant [s] at which the excess of a pressure over P0 becomes positive."""
+    """Find the instant [s] at which the excess of a pressure over P0 becomes positive, or NaN."""
     above = np.flatnonzero(excess > 0.0)
     if not above.size or above[0] == 0:
-        return float(time[-1] if not above.size else time[0])
+        return math.nan
     k = int(above[0])
     share = -excess[k - 1] / (excess[k] - excess[k - 1])
     return float(time[k - 1] + share * (time[k] - time[k - 1]))
@@ -274,13 +278,16 @@ def assess_quantity(
     stated: Statement | None = None,
 ) -> Estimate:
     """Assess a quantity by its standard deviation and by that of its priors."""
-    row = slopes.differentiate([quantity])[0]
+    declared = None if stated is None else stated.spec
     value = quantity(slopes.values)
+    if math.isnan(value):
+        verdict = Verdict.NOT_IDENTIFIABLE
+        return Estimate(name, None, None, verdict, METHOD, reason=_NO_TORQUE, spec=declared)
+    row = slopes.differentiate([quantity])[0]
     wide = np.linalg.inv(found.coordinates.prior.precision)
     std, before = (math.sqrt(max(float(row @ c @ row), 0.0)) for c in (slopes.covariance, wide))
     if stated is not None and stated.law is not None:
         std = math.hypot(std, stated.law(slopes.values))
-    declared = None if stated is None else stated.spec
     return assess_with_prior(
         (name, value, std), PriorValue(value, before), METHOD, declared=declared
     )

@@ -101,3 +101,9 @@ def test_advice_asks_for_no_entry_that_the_card_states(stem: str, share: float) 
     noise = float(np.sqrt(1.0 - share**2))
     advice = get_advice(f"{stem}{ending}", noise, share)
     assert not re.search(r"\b[Ee]nter\b|\b[Ss]tate\b|\bsmaller\b|\bcard\b", advice)
+
+
+def test_a_held_value_keeps_the_declaration_of_its_quantity() -> None:
+    declared = SPECS["eta"]
+    one = assess_with_prior(("K2.onset", 0.4, 0.0), PriorValue(0.4, 0.0), "log", declared=declared)
+    assert (one.verdict, one.unit) == (Verdict.DESIGN, declared.unit)

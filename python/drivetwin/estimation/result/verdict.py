@@ -151,7 +151,7 @@ def assess_with_prior(
     name, value, std = computed
     spec = declared or get_parameter_spec(name)
     if design.std == 0.0:
-        return from_prior(name, PriorValue(value), Code.FIXED_BY_CARD)
+        return replace(from_prior(name, PriorValue(value), Code.FIXED_BY_CARD), spec=declared)
     if std >= VERDICT.prior_share * design.std:
         prior = PriorValue(value, std)
         if declared is None:
