@@ -137,6 +137,7 @@ class Code(StrEnum):
     RATIO_OFF_CARD = auto()
     FIXED_NUMBER_REFINED = auto()
     FIXED_NUMBER_OFF = auto()
+    PRIOR_CONTRADICTED = auto()
     OMISSION_SHOWN = auto()
     GAIN_SUSPECT = auto()
     GAIN_ASSUMED = auto()

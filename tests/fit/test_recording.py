@@ -88,5 +88,5 @@ def test_a_missing_output_and_a_short_one_are_named() -> None:
     with pytest.raises(InputError, match="the recording has no x"):
         build_network_record(recording, ["x"], {})
     late = replace(recording.outputs["w"], time=OUTPUT_TIME + 10.0)
-    with pytest.raises(InputError, match=r"w: 0 samples from 0.500 to 3\.990 s"):
+    with pytest.raises(InputError, match=r"w: 0 samples from 0.500 to 3\.990 s, fewer than 20"):
         build_network_record(replace(recording, outputs={"w": late}), ["w"], {})

@@ -10,9 +10,13 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from drivetwin.estimation.result.estimate import Z95
+from drivetwin.estimation.result.estimate import Z95, Verdict
+from drivetwin.estimation.result.method import ModelStatus
+from drivetwin.findings import Code
+from drivetwin.fit.fit import fit_network
 from drivetwin.fit.result import WITH_PRIOR
 from drivetwin.fit.synthesize import ModelName
+from drivetwin.fit.unknown import Unknown
 from drivetwin.simulation.network import simulate
 from drivetwin.simulation.network_sensitivity import get_number
 from tests.support.fits import fit_log, make_log
@@ -85,3 +89,18 @@ def test_a_result_is_stored_and_simulates_as_before() -> None:
     (one,), (other,) = again.simulate(), found.simulate()
     for output, column in other.columns.items():
         assert np.array_equal(one.columns[output], column)
+
+
+def test_a_prior_that_the_recordings_contradict_limits_all_values() -> None:
+    made = make_log(ModelName.TIP_IN)
+    wrong = {**made.model.unknowns, "motor.inertia": Unknown(0.06, 0.0004)}
+    found = fit_network(replace(made.model, unknowns=wrong), [made.recording])
+    (finding,) = (one for one in found.findings if one.code is Code.PRIOR_CONTRADICTED)
+    assert "motor.inertia is 0.0" in finding.text
+    assert found.status is not ModelStatus.VALID
+    verdicts = {one.verdict for one in found.estimates.values()}
+    assert not verdicts & {Verdict.IDENTIFIED, Verdict.DESIGN}
+    # A prior as far off moves nothing where the recordings know the number much better.
+    loose = {**made.model.unknowns, "shaft.gap": Unknown(0.015, 0.0015)}
+    right = fit_network(replace(made.model, unknowns=loose), [made.recording])
+    assert right.status is ModelStatus.VALID

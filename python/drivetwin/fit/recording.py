@@ -209,8 +209,10 @@ def build_network_record(
         one = recording.outputs[name]
         inside = (one.time >= late) & (one.time <= early) & np.isfinite(one.values)
         if np.count_nonzero(inside) < _MIN_SAMPLES:
-            what = f"{name}: {np.count_nonzero(inside)} samples from {late:.3f} to {early:.3f} s"
-            raise InputError(what, "record the outputs over the same time as the inputs")
+            count = np.count_nonzero(inside)
+            what = f"{name}: {count} samples from {late:.3f} to {early:.3f} s, fewer than"
+            remedy = "record outputs and inputs over the same time, for longer or faster"
+            raise InputError(f"{what} {_MIN_SAMPLES}", remedy)
         compared[name] = replace(one, time=one.time[inside], values=one.values[inside])
     stamps = np.unique(np.concatenate([one.time for one in compared.values()]))
     for name, one in compared.items():  # simulated as early and as late as it may be sampled

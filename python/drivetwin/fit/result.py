@@ -304,6 +304,23 @@ def _iterate_coordinates(
         yield one, coordinate, math.sqrt(max(float(slopes @ covariance @ slopes), 0.0))
 
 
+def _find_contradicted(
+    listed: Sequence[tuple[PlacedNumber, float, float]],
+) -> Iterator[Finding]:
+    """Find numbers whose prior the recordings contradict, where it moves the value by more than a
+    standard deviation: by `ratio` of the distance, as a mean of prior and recordings."""
+    for one, coordinate, std in listed:
+        if one.spread is None:
+            continue
+        apart, ratio = abs(coordinate - one.start) / one.spread, std / one.spread
+        if apart > PRIOR.contradiction and apart * ratio > 1.0:
+            value, unit = one.to_value(coordinate), one.spec.unit
+            scale = value if one.is_positive else 1.0
+            found = Number(value, unit, Z95 * std * scale)
+            stated = Number(one.stated.value, unit, Z95 * one.stated.std)
+            yield report(Code.PRIOR_CONTRADICTED, unknown=one.name, found=found, stated=stated)
+
+
 def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum) -> ModelFit:
     """Judge the unknowns and the model at a minimum."""
     minimum, sought = found.result, numbers.sought
@@ -313,11 +330,11 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
     profiles = trace_slow(minimum, covariance, len(sought)) if is_explained else {}
     covariance, by_profile = widen(covariance, profiles, problem.prior)
     estimates, values, spreads, intervals = {}, {}, {}, {}
-    listed = _iterate_coordinates(numbers, minimum.point, covariance)
+    listed = list(_iterate_coordinates(numbers, minimum.point, covariance))
     for k, (one, coordinate, std) in enumerate(listed):
         name, value = one.name, one.to_value(coordinate)
         values[name], spreads[name] = value, value * std if one.is_positive else std
-        estimates[name] = _judge(one, value, spreads[name])
+        estimates[name] = _judge(one, coordinate, spreads[name])
         low, high = by_profile.get(k, (coordinate - Z95 * std, coordinate + Z95 * std))
         intervals[name] = (one.to_value(low), one.to_value(high))
     agreement = tuple(term.compare(minimum.point) for term in problem.terms)
@@ -329,6 +346,7 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
     findings = (
         *failures,
         *ended,
+        *(_find_contradicted(listed) if is_explained else ()),
         *_report_omissions(found.shown, moved),
         *doubts,
         *(one for one in remarks if one is not None),
@@ -390,11 +408,13 @@ def _compute_chi2(minimum: OptimizeResult[Problem]) -> float:
     return (minimum.normal.cost - prior) / minimum.problem.size
 
 
-def _judge(one: PlacedNumber, value: float, std: float) -> Estimate:
-    """Return the estimate of a number from its value and its standard deviation."""
-    numbers, stated = (one.name, value, std), one.stated
-    if stated.std is None:
-        return assess(*numbers, METHOD, spec=one.spec)
+def _judge(one: PlacedNumber, coordinate: float, std: float) -> Estimate:
+    """Return the estimate of a number from its coordinate and the standard deviation of its value;
+    a prior that the recordings contradict is no design value."""
+    value, stated = one.to_value(coordinate), one.stated
+    numbers = (one.name, value, std)
+    if one.spread is None or abs(coordinate - one.start) > PRIOR.contradiction * one.spread:
+        return assess(*numbers, METHOD if one.spread is None else WITH_PRIOR, spec=one.spec)
     # The prior of a positive number is relative: its spread at the estimate.
     scale = value / stated.value if one.is_positive else 1.0
     prior = PriorValue(stated.value, stated.std * scale)

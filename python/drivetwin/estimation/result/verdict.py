@@ -62,7 +62,7 @@ _EXPERIMENT = {
 }
 
 
-_ANY_EXPERIMENT = "Record a manoeuvre that it changes more, or state its prior."
+_ANY_EXPERIMENT = "Record a manoeuvre that it changes more, or narrow its prior."
 """Experiment for a quantity that is not in the parameter table."""
 
 
