@@ -108,13 +108,29 @@ def estimate_alignment(spans: Sequence[JoinedSpan], late: float | None = None) -
     by_gear: dict[str, list[ShiftValue]] = {}
     for one, (found, covariance) in zip(spans, made, strict=True):
         delays.append(_make_value(one.label, late + found[1], covariance[1, 1]))
-        by_gear.setdefault(one.gear, []).append(_make_value(one.label, found[0], covariance[0, 0]))
+        variance = covariance[0, 0] + found[0] ** 2 * _compute_rounding(one)
+        by_gear.setdefault(one.gear, []).append(_make_value(one.label, found[0], variance))
     return Alignment(tuple(delays), {gear: tuple(each) for gear, each in by_gear.items()})
 
 
 def _make_value(label: str, value: float, variance: float) -> ShiftValue:
     information = 1.0 / variance if variance > 0.0 else 0.0
     return ShiftValue(label, np.array([value]), np.array([[information]]))
+
+
+def _compute_rounding(one: JoinedSpan) -> float:
+    """Compute the relative variance of a ratio by rounding errors that do not average out.
+
+    While a speed shows one number, all its samples have about the same error. Over the numbers that
+    it passes through, the mean error falls with their count.
+    """
+    other = one.other.select((float(one.time[0]), float(one.time[-1])))[1]
+    errors = [
+        floor / np.mean(values) / max(1.0, float(np.ptp(values)) / (np.sqrt(12.0) * floor))
+        for values, floor in ((one.values, one.floor), (other, one.other.floor))
+        if floor > 0.0 and values.size
+    ]
+    return float(np.sum(np.square(errors)))
 
 
 def _fit_ratio(one: JoinedSpan, late: float) -> tuple[float, float]:

@@ -232,6 +232,14 @@ def test_an_electric_motor_turns_fast_and_changes_its_speed_fast() -> None:
         check("input_speed", 2.0 * turning, "rpm")
 
 
+def test_a_pedal_between_two_slow_samples_is_no_overflow() -> None:
+    time = np.arange(0.0, 5.0, 0.1)
+    torque = np.where(time < 2.45, 1000.0 - 160.0 * time, 2400.0 - 160.0 * time)
+    assert check("engine_torque", torque, time=time).findings == ()
+    with pytest.raises(DamagedChannelError, match="as a number that overflows does"):
+        check("engine_torque", torque, time=0.1 * time)
+
+
 def test_a_switched_pressure_does_not_overflow() -> None:
     values = np.where(np.arange(TIME.size) < TIME.size // 2, 14e5, 0.0)
     values = values + 4e3 * np.random.default_rng(1).normal(size=TIME.size)

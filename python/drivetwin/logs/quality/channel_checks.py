@@ -84,8 +84,9 @@ LEAST_SUCTION = BAR
 WRAP_SHARE, WRAP_CONTRAST = 0.8, 10.0
 """An overflow jumps by this share of the range, and by so many usual steps."""
 
-WRAP_STEP = 15e-3
-"""Sample interval [s] from which output torque may do so: it falls in a quarter period."""
+WRAP_STEP, WRAP_LONGER = 15e-3, 50e-3
+"""Sample interval [s] from which output torque may do so: it falls in a quarter period; and that of
+engine torque and pressures, which a control moves through their range in some such intervals."""
 
 WRAP_BESIDE, WRAP_DRIFT, WRAP_STEPS = 5, 0.02, 3.0
 """So many samples before and after an overflow move against the jump by this share of the range at
@@ -386,7 +387,7 @@ def _check_wraps(channel: Channel, where: Where) -> None:
     """
     if channel.quantity not in (Quantity.TORQUE, Quantity.PRESSURE):
         return
-    if channel.role == "output_torque" and channel.step > WRAP_STEP:
+    if channel.step > (WRAP_STEP if channel.role == "output_torque" else WRAP_LONGER):
         return
     values, span = channel.values, float(np.ptp(channel.values))
     near, usual = WRAP_BESIDE, compute_usual_step(values)
