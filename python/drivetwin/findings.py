@@ -138,6 +138,7 @@ class Code(StrEnum):
     FIXED_NUMBER_REFINED = auto()
     FIXED_NUMBER_OFF = auto()
     PRIOR_CONTRADICTED = auto()
+    PRIOR_MISSED = auto()
     OMISSION_SHOWN = auto()
     GAIN_SUSPECT = auto()
     GAIN_ASSUMED = auto()

@@ -101,6 +101,8 @@ def test_a_prior_that_the_recordings_contradict_limits_all_values() -> None:
     verdicts = {one.verdict for one in found.estimates.values()}
     assert not verdicts & {Verdict.IDENTIFIED, Verdict.DESIGN}
     # A prior as far off moves nothing where the recordings know the number much better.
-    loose = {**made.model.unknowns, "shaft.gap": Unknown(0.015, 0.0015)}
+    loose = {**made.model.unknowns, "shaft.gap": Unknown(0.015, 0.0013)}
     right = fit_network(replace(made.model, unknowns=loose), [made.recording])
     assert right.status is ModelStatus.VALID
+    (warned,) = (one for one in right.findings if one.code is Code.PRIOR_MISSED)
+    assert "shaft.gap is 0.02" in warned.text

@@ -307,18 +307,21 @@ def _iterate_coordinates(
 def _find_contradicted(
     listed: Sequence[tuple[PlacedNumber, float, float]],
 ) -> Iterator[Finding]:
-    """Find numbers whose prior the recordings contradict, where it moves the value by more than a
-    standard deviation: by `ratio` of the distance, as a mean of prior and recordings."""
+    """Find numbers whose prior the recordings contradict.
+
+    It moves the value by the ratio of both deviations times the distance, as a mean of prior and
+    recordings: an error from one standard deviation of the value on.
+    """
     for one, coordinate, std in listed:
         if one.spread is None:
             continue
         apart, ratio = abs(coordinate - one.start) / one.spread, std / one.spread
-        if apart > PRIOR.contradiction and apart * ratio > 1.0:
+        if apart > PRIOR.contradiction:
             value, unit = one.to_value(coordinate), one.spec.unit
-            scale = value if one.is_positive else 1.0
-            found = Number(value, unit, Z95 * std * scale)
+            found = Number(value, unit, Z95 * std * (value if one.is_positive else 1.0))
             stated = Number(one.stated.value, unit, Z95 * one.stated.std)
-            yield report(Code.PRIOR_CONTRADICTED, unknown=one.name, found=found, stated=stated)
+            code = Code.PRIOR_CONTRADICTED if apart * ratio > 1.0 else Code.PRIOR_MISSED
+            yield report(code, unknown=one.name, found=found, stated=stated)
 
 
 def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum) -> ModelFit:
