@@ -24,6 +24,7 @@ def columns(names: Sequence[str]) -> list[Column]:
     [
         ("engine_torque", "EngTrq TqEng TqEng_c Motormoment MMot_Ist_c engine_torque te M_Mot"),
         ("engine_torque", "CAN_EngTrq MdMot_CAN M_Motor_Nm EngTorque.Value Mot_Trq T_e"),
+        ("engine_torque", r"trqEng\XETK:1 trqEng_XETK_1 trqEng__ETKC_2 TrqEng_10ms EngTrq_XCP_1"),
         ("output_torque", "TrqOut MAbtr_Mess Abtriebsmoment output_torque TqOut M_ab"),
         ("output_torque", "M_Kardan PropShaftTrq M_Abtriebswelle Gelenkwellenmoment"),
         ("input_speed", "SpdIn nGetrEin n_ein Eingangsdrehzahl w_in input_speed n_turb"),

@@ -86,7 +86,8 @@ def read_toml(path: Path | str, error: type[InputError]) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise error("the file is no UTF-8 text", "hand in a TOML text file", where) from None
     except ValueError as fault:
-        raise error(f"no valid TOML: {fault}", "correct the syntax there", where) from None
+        remedy = "correct the syntax there; a number has a decimal point, no comma"
+        raise error(f"no valid TOML: {fault}", remedy, where) from None
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -55,10 +55,13 @@ class NameTable:
         return "|".join(word for word in self.words[kind] if len(word) >= least)
 
 
+_ASIDE = re.compile(r"\\.*$|\[[^\]]*\]|(?:_\d+ms|_+x?(?:etkc?|ccp|cp)_\d+)$", re.DOTALL)
+"""Parts of a name beside the quantity: device (`\\XETK:1`, in other files `_XETK_1`), unit, raster."""
+
+
 def normalise_name(name: str) -> str:
     """Reduce a column name to letters and digits for comparison: `n_Ab [1/min]` -> `nab`."""
-    text = unicodedata.normalize("NFC", name).casefold()
-    text = re.sub(r"\\.*$|\[[^\]]*\]", "", text, flags=re.DOTALL)
+    text = _ASIDE.sub("", unicodedata.normalize("NFC", name).casefold())
     for umlaut, letters in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("ß", "ss"), ("ω", "w")):
         text = text.replace(umlaut, letters)
     return re.sub(r"[^a-z0-9]", "", text)
