@@ -22,8 +22,9 @@ from benchmarks.code_version import read_commit
 from benchmarks.fit.problem import Problem, Realisation, record
 from benchmarks.fit.problems import PROBLEMS, build_problem
 from benchmarks.fit.study import HALF, compute_error, fit_model, scale_std
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, integrate_trapezoids
 from drivetwin.errors import DrivetwinError
+from drivetwin.estimation.likelihood.effects.synthetic_vehicle import filter_torque
 from drivetwin.fit.fixed_numbers import make_plain
 from drivetwin.simulation.element_schema import GROUND, list_ports
 from drivetwin.simulation.network import Output, Start, make_input, simulate
@@ -49,6 +50,9 @@ class Clean:
     speeds: Mapping[str, float]
     power: float
 
+
+TORQUES = ("shaft_torque", "torque", "friction_torque")
+"""Kinds of recorded quantities that are torques."""
 
 Alter = Callable[[Clean, np.random.Generator], Elements]
 
@@ -103,9 +107,49 @@ def add_falling_friction(clean: Clean, rng: np.random.Generator) -> Elements:
     ]
 
 
+def add_clutch_drag(clean: Clean, rng: np.random.Generator) -> Elements:
+    """Let a clutch drag while it is open, by about 0.5 % of the power at its largest slip."""
+    clutches = [one for one in clean.elements if one["type"] == "clutch"]
+    clutch = clutches[int(rng.integers(len(clutches)))]
+    ends = list_ports(clutch)
+    speed = max(max(clean.speeds.get(one, 0.0) for one in ends.values()), 1.0)
+    torque = 0.005 * clean.power / speed * _draw_size(rng)
+    drag = {"type": "viscous_coupling", "name": "left out", "a": ends["a"], "b": ends["b"]}
+    return [*clean.elements, {**drag, "slip": [speed], "torque": [torque]}]
+
+
 def _draw_size(rng: np.random.Generator) -> float:
     """Draw a factor about 1."""
     return math.exp(SPREAD * float(rng.standard_normal()))
+
+
+Distort = Callable[[str, FloatArray, FloatArray, float], FloatArray]
+"""Changes a recorded quantity of a kind: its instants (n,), its values (n,), and a factor of the
+usual size."""
+
+
+def add_offset(kind: str, time: FloatArray, values: FloatArray, size: float) -> FloatArray:
+    """Add 0.3 % of the largest torque to a torque."""
+    del time
+    return values + 0.003 * size * np.max(np.abs(values)) * (kind in TORQUES)
+
+
+def add_curve(kind: str, time: FloatArray, values: FloatArray, size: float) -> FloatArray:
+    """Let a torque be 0.5 % too large at its largest value, and exact at zero."""
+    del time
+    share = values * np.abs(values) / np.max(np.abs(values))
+    return values + 0.005 * size * share * (kind in TORQUES)
+
+
+def add_filter(kind: str, time: FloatArray, values: FloatArray, size: float) -> FloatArray:
+    """Filter a torque by a Butterworth of order 2 with a delay of 3 ms."""
+    return filter_torque(time, values, 0.003 * size) if kind in TORQUES else values
+
+
+def add_run_out(kind: str, time: FloatArray, values: FloatArray, size: float) -> FloatArray:
+    """Add an error of 0.05 % once per turn to a speed."""
+    angle = integrate_trapezoids(values, time)
+    return values * (1.0 + 5e-4 * size * np.sin(angle) * (kind == "speed"))
 
 
 @dataclass(frozen=True)
@@ -115,6 +159,7 @@ class Omission:
     problems: Sequence[str]
     alter: Alter = lambda clean, _: clean.elements
     is_delay: bool = False
+    distort: Distort | None = None
 
 
 OMISSIONS = {
@@ -124,6 +169,11 @@ OMISSIONS = {
     "backlash": Omission(WITH_CLUTCH, add_backlash),
     "tyre slip": Omission(WITH_CLUTCH, add_tyre_slip),
     "falling friction": Omission(WITH_CLUTCH, add_falling_friction),
+    "clutch drag": Omission(WITH_CLUTCH, add_clutch_drag),
+    "sensor offset": Omission(tuple(PROBLEMS), distort=add_offset),
+    "curved sensor": Omission(tuple(PROBLEMS), distort=add_curve),
+    "filtered sensor": Omission(tuple(PROBLEMS), distort=add_filter),
+    "run-out": Omission(tuple(PROBLEMS), distort=add_run_out),
 }
 """Omissions by name."""
 
@@ -172,7 +222,7 @@ def run(name: str, seed: int) -> tuple[str, Outcome]:
 
 def draw(problem: Problem, omission: Omission, rng: np.random.Generator) -> Realisation:
     """Draw a realisation of a driveline with an omission."""
-    drawn = record(problem, rng, _simulate(problem, omission.alter, rng))
+    drawn = record(problem, rng, _simulate(problem, omission, rng))
     pressures = {
         one.element["pressure"] for one in problem.build().components if one.kind == "clutch"
     }
@@ -187,7 +237,7 @@ def draw(problem: Problem, omission: Omission, rng: np.random.Generator) -> Real
     return replace(drawn, inputs={**drawn.inputs, **late})
 
 
-def _simulate(problem: Problem, alter: Alter, rng: np.random.Generator) -> FloatArray:
+def _simulate(problem: Problem, omission: Omission, rng: np.random.Generator) -> FloatArray:
     """Simulate the outputs (m, n) of an altered driveline; the start of a new node is that of the
     vehicle."""
     given = problem.build().describe({}, {})
@@ -203,7 +253,7 @@ def _simulate(problem: Problem, alter: Alter, rng: np.random.Generator) -> Float
         for one in clean
         if one["type"] == "torque"
     )
-    elements, start = alter(Clean(clean, largest, power), rng), given.start
+    elements, start = omission.alter(Clean(clean, largest, power), rng), given.start
     speeds = dict(start.speeds)
     for one in elements:
         if one["type"] == "tyre":
@@ -213,7 +263,14 @@ def _simulate(problem: Problem, alter: Alter, rng: np.random.Generator) -> Float
     )
     if found.status != "completed":
         raise RuntimeError(f"the true run of {problem.name} does not complete: {found.status}")
-    return np.array([found.columns[one] for one in problem.records])
+    columns = {one: found.columns[one] for one in problem.records}
+    if omission.distort is not None:
+        size = _draw_size(rng)
+        columns = {
+            one: omission.distort(one[0], problem.time, values, size)
+            for one, values in columns.items()
+        }
+    return np.array([*columns.values()])
 
 
 def format_outcomes(name: str, found: Sequence[Outcome]) -> str:

@@ -166,7 +166,9 @@ def _build_plant(
     }
     every = {**inputs, **record.inputs}
     start = drop_redundant_speeds(model.start, model.elements, every, record.time[:2])
-    sizes = {name: float(np.max(np.abs(one.values))) for name, one in record.inputs.items()}
+    values = {name: one.values for name, one in record.inputs.items()}
+    values |= {one.name: one.values for one in record.outputs}
+    sizes = {name: float(np.max(np.abs(one))) for name, one in values.items() if one.size}
     return replace(plain, inputs=inputs, start=start, sizes=sizes)
 
 

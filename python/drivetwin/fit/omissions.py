@@ -6,7 +6,8 @@ delay of a channel, a slope of friction. Its column is the derivative of the rec
 score test). Its evidence is that of `column_products`, averaged over standard deviations of its
 size about the usual one. The likeliest omission is put into the model, with its
 likeliest S as prior, while it is likelier than its absence. Each of the others widens the
-covariance by its moves, times its probability.
+covariance by its moves, times its probability: against absence at the end, against the one that
+was put into the model where that was chosen.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.roles import Quantity
 from drivetwin.estimation.result.cause import EXPLAINED
 from drivetwin.fit.fixed_numbers import FixedNumber, Source
-from drivetwin.fit.places import find_input_quantity, list_places
-from drivetwin.fit.plant import NetworkTerm, Problem
+from drivetwin.fit.places import Place, find_input_quantity, get_output_quantity, list_places
+from drivetwin.fit.plant import NetworkTerm, Plant, Problem
 from drivetwin.fit.release import extend
 from drivetwin.fit.unknown import ASCII_UNITS
 from drivetwin.likelihood.column_products import adjust_unknowns, weigh_amounts
@@ -55,6 +56,10 @@ class OmissionSettings:
     spread."""
     output_delay: float = 0.002
     """Usual delay of an output: filter of its sensor [s]."""
+    torque_offset: float = 0.001
+    """Usual offset of a torque sensor over its largest torque [ratio]."""
+    torque_curve: float = 0.005
+    """Usual curvature of a torque channel at its largest torque [ratio]."""
     friction_slope: float = 5e-5
     """Usual slope of friction over slip: 0.005 over 100 rad/s [s/rad]."""
     spread: float = 2.3
@@ -88,10 +93,14 @@ class Omission:
 
 @dataclass(frozen=True, eq=False)
 class ShownOmission:
-    """Omission that is in the model of a minimum, with its log `evidence` before."""
+    """Omission that is in the model of a minimum, with its log `evidence` before.
+
+    `rivals` are the names of others that explain the recordings as well.
+    """
 
     number: FixedNumber
     evidence: float
+    rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,29 +129,38 @@ def complete_model(found: OptimizeResult[Problem], stated: Collection[str]) -> C
     candidates = _list_omissions(found, stated)
     plays = _list_plays(found)
     shown: list[ShownOmission] = []
+    apart: list[_Rival] = []
     weighed = _weigh_all(found, candidates)
     while len(shown) < OMISSIONS.most:
         best = max(weighed, key=lambda one: one.nats, default=None)
         if best is not None and best.weight >= 1.0:
             candidates = [one for one in candidates if one is not best.omission]
             nats, better = best.nats, _put_into_model(found, best)
+            rivals = _list_rivals(best, weighed)
         elif plays and not is_explained(found):
+            rivals = []
             nats, better = _put_play(found, plays.pop())
         else:
             break
         if better is not None:
             found = better
-            shown.append(ShownOmission(found.problem.terms[0].plant.fixed[-1], nats))
+            number = found.problem.terms[0].plant.fixed[-1]
+            names = [one.name for one in rivals if one.share > OMISSIONS.odds]
+            shown.append(ShownOmission(number, nats, tuple(names)))
+            apart += rivals
         weighed = _weigh_all(found, candidates)
     if shown and found.normal.cost > EXPLAINED * found.problem.size:
         # What leaves a residual as it is explains nothing.
-        found, shown = stated_model, []
+        found, shown, apart = stated_model, [], []
         weighed = _weigh_all(found, candidates)
     total = 1.0 + sum(one.weight for one in weighed)
     size = len(found.point.names)
     spread = np.zeros((size, size))
     for one in weighed:
         spread += one.weight / total * one.power * np.outer(one.moves, one.moves)
+    for rival in apart:
+        own = slice(rival.apart.size)
+        spread[own, own] += rival.share * np.outer(rival.apart, rival.apart)
     return CompletedFit(found, tuple(shown), spread)
 
 
@@ -161,19 +179,9 @@ def _list_omissions(found: OptimizeResult[Problem], stated: Collection[str]) -> 
     plant = term.plant
     taken = {*stated, *(one.path for one in plant.settings)}
     moved = {keys for one in plant.fixed for keys in one.places}
-    delays = {
-        Quantity.PRESSURE: OMISSIONS.pressure_delay,
-        Quantity.TORQUE: OMISSIONS.torque_delay,
-    }
     listed = []
     for path, one in plant.places.items():
-        size = 0.0
-        if one.field == "friction.mu_v":
-            size = OMISSIONS.friction_slope
-        elif one.field == "delay" and one.keys[0] == "outputs":
-            size = OMISSIONS.output_delay
-        elif one.field == "delay" and one.keys[1] in term.record.inputs:
-            size = delays.get(find_input_quantity(str(one.keys[1]), plant.elements), 0.0)
+        size = _find_usual_size(one, plant)
         if size > 0.0 and path not in taken and one.keys not in moved:
             listed.append(Omission(path, path, size))
     speeds, power = _measure_run(term, found.point)
@@ -187,6 +195,36 @@ def _list_omissions(found: OptimizeResult[Problem], stated: Collection[str]) -> 
         load = {"type": "road_load", "name": name, "node": node, **_NO_LOAD}
         listed.append(Omission(name, f"{name}.constant", size, load))
     return listed
+
+
+def _find_usual_size(place: Place, plant: Plant) -> float:
+    """Find the usual size of a number that is zero as stated, SI; 0 for one that is no omission."""
+    if place.field == "friction.mu_v":
+        return OMISSIONS.friction_slope
+    table, channel = place.keys[0], str(place.keys[1])
+    if table not in ("inputs", "outputs") or not plant.sizes.get(channel):
+        return 0.0
+    is_output = table == "outputs"
+    quantity = (
+        get_output_quantity(plant.outputs[channel])
+        if is_output
+        else find_input_quantity(channel, plant.elements)
+    )
+    if place.field == "delay":
+        return OMISSIONS.output_delay if is_output else _INPUT_DELAYS.get(quantity, 0.0)
+    if quantity is not Quantity.TORQUE:
+        return 0.0
+    if place.field == "curve":
+        return OMISSIONS.torque_curve / plant.sizes[channel]
+    # The offset of an input is a torque at its node.
+    is_offset = place.field == "offset" and is_output
+    return OMISSIONS.torque_offset * plant.sizes[channel] if is_offset else 0.0
+
+
+_INPUT_DELAYS = {
+    Quantity.PRESSURE: OMISSIONS.pressure_delay,
+    Quantity.TORQUE: OMISSIONS.torque_delay,
+}
 
 
 def _list_plays(found: OptimizeResult[Problem]) -> list[Omission]:
@@ -300,6 +338,27 @@ def _weigh_all(found: OptimizeResult[Problem], listed: Sequence[Omission]) -> li
         _weigh(one, float(own), float(pull), moves)
         for one, own, pull, moves, whole in rows
         if own > OMISSIONS.least_share * whole
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rival:
+    """Omission that another one was chosen before, with the probability `share` that it is the true
+    one, and the moves (p,) by it less those by the other."""
+
+    name: str
+    share: float
+    apart: FloatArray
+
+
+def _list_rivals(best: _Weighed, weighed: Sequence[_Weighed]) -> list[_Rival]:
+    """List the rivals of the likeliest omission."""
+    whole = logsumexp([one.nats for one in weighed])
+    chosen = best.amount * best.moves
+    return [
+        _Rival(one.omission.name, math.exp(one.nats - whole), one.amount * one.moves - chosen)
+        for one in weighed
+        if one is not best
     ]
 
 

@@ -24,8 +24,8 @@ Keys = tuple[int | str, ...]
 """Keys that lead to a number of a run: `elements`, `speeds`, `twists`, `levels` of
 constant inputs, `inputs` and `outputs` as channels."""
 
-CHANNEL: Mapping[str, float] = {"gain": 1.0, "offset": 0.0, "delay": 0.0}
-"""Numbers of a channel without errors. A channel is gain · x(t - delay) + offset."""
+CHANNEL: Mapping[str, float] = {"gain": 1.0, "offset": 0.0, "delay": 0.0, "curve": 0.0}
+"""Numbers of a channel without errors: gain · x + curve · x·|x| + offset, with x at t - delay."""
 
 
 class Place(NamedTuple):
@@ -92,7 +92,9 @@ def _list_channels(table: str, quantities: Mapping[str, Quantity]) -> list[Place
             head,
             (table, name, head),
             value,
-            {"gain": "1", "offset": quantity.unit, "delay": "s"}[head],
+            {"gain": "1", "offset": quantity.unit, "delay": "s", "curve": f"1/({quantity.unit})"}[
+                head
+            ],
             known=table == "inputs" and head == "delay",
             quantity=quantity,
         )

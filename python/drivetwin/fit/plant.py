@@ -11,6 +11,8 @@ from typing import Any, Self
 
 import numpy as np
 
+import numpy as np
+
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.fit.fixed_numbers import FixedNumber
@@ -34,7 +36,7 @@ class Plant(RecordedPlant[RecordedData]):
     """Network of one recording.
 
     `inputs` are those that no channel gives, `levels` the constant ones among them, `sizes` the
-    largest magnitudes of the others, SI. `places` are the numbers by path, `settings` those that
+    largest magnitudes of the channels, SI. `places` are the numbers by path, `settings` those that
     the unknowns `sought` set. `own` are the unknowns of the start of this recording by node or
     shaft, `fixed` the numbers beside the unknowns that may move. `label` precedes the start in the
     vector of the unknowns: `log1.start.engine`; empty where there is one recording. `usual_rate`
@@ -100,8 +102,11 @@ class Plant(RecordedPlant[RecordedData]):
 
     def get_step(self, name: str) -> float:
         """Return the step of a coordinate for a difference of runs."""
-        acted = [place for one, place in self._acting if one == name and place.field == "offset"]
-        sizes = [self.sizes.get(str(place.keys[1]), 0.0) for place in acted]
+        sizes = [
+            (self.sizes.get(str(place.keys[1])) or 1.0) ** _POWERS[place.field]
+            for one, place in self._acting
+            if one == name and place.field in _POWERS
+        ]
         for one in self.sought:
             if one.name == name:
                 size = max(abs(one.start), one.spread or 0.0, *sizes, 1e-6)
@@ -120,7 +125,8 @@ class Plant(RecordedPlant[RecordedData]):
         for name, numbers in tables["inputs"].items():
             signal = every[name]
             assert isinstance(signal, Signal)
-            values = float(numbers["gain"]) * signal.values + float(numbers["offset"])
+            gain = float(numbers["gain"]) + float(numbers["curve"]) * np.abs(signal.values)
+            values = gain * signal.values + float(numbers["offset"])
             every[name] = replace(signal, values=values, delay=numbers["delay"])
         for name in self._channels["levels"].difference(inputs):
             level = float(tables["levels"][name])
@@ -210,6 +216,8 @@ class RateSettings:
 
 
 RATE = RateSettings()
+_POWERS = {"offset": 1, "curve": -1}
+"""Powers of a channel's largest value that errors of the channel are of the order of."""
 _SHARE = 1e-6
 """Step of a difference of runs over an unknown, or over the deviation of a fixed number [ratio].
 

@@ -401,8 +401,9 @@ def _report_omissions(
         if abs(at.value - at.number.value) < Z95 * at.std and not at.number.is_relative:
             continue  # another omission has taken its place
         size = Number(at.value, one.number.unit or "1", Z95 * at.std)
+        subject = " or ".join((one.number.name, *one.rivals))
         yield report(
-            Code.OMISSION_SHOWN, one.number.name, size=size, evidence=one.evidence, moved=at.widens
+            Code.OMISSION_SHOWN, subject, size=size, evidence=one.evidence, moved=at.widens
         )
 
 

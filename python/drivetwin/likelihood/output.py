@@ -140,11 +140,13 @@ class ComparedOutputs:
 
 @dataclass(frozen=True)
 class Channel:
-    """Measured quantity of a quantity x: `gain` · x(t - `delay`) + `offset`."""
+    """Measured quantity of a quantity x: `gain` · x + `curve` · x·|x| + `offset`, with x at
+    t - `delay`."""
 
     gain: float = 1.0
     offset: float = 0.0
     delay: float = 0.0
+    curve: float = 0.0
 
     def delay_columns(self, time: FloatArray, columns: FloatArray) -> FloatArray:
         """Interpolate quantities (N, ...) at the instants `time` (N,) [s] less the delay."""
@@ -158,7 +160,14 @@ class Channel:
 
     def show(self, time: FloatArray, column: FloatArray) -> FloatArray:
         """Compute the measured quantity (N, ...) of a quantity over `time` (N,) [s]."""
-        return np.asarray(self.gain * self.delay_columns(time, column) + self.offset)
+        late = self.delay_columns(time, column)
+        return np.asarray((self.gain + self.curve * np.abs(late)) * late + self.offset)
+
+    def show_changes(self, time: FloatArray, changes: FloatArray, column: FloatArray) -> FloatArray:
+        """Compute the changes (N, p) of the measured quantity by those of the quantity, which is
+        `column` (N,) over `time` (N,) [s]."""
+        slope = self.gain + 2.0 * self.curve * np.abs(column)
+        return self.delay_columns(time, slope[:, None] * changes)
 
     def find_shown(self, out: Output, time: FloatArray) -> Output:
         """Return an output with its samples at the points of the grid `time` (N,) [s] that they

@@ -29,7 +29,7 @@ from drivetwin.simulation import network
 from drivetwin.simulation.dual_clutch import Signal
 from drivetwin.simulation.network import NetworkRun, build_element
 from drivetwin.simulation.network_response import compute_response
-from drivetwin.simulation.network_sensitivity import NetworkTask
+from drivetwin.simulation.network_sensitivity import NetworkSensitivities, NetworkTask
 
 R = TypeVar("R", bound=RecordedData)
 
@@ -174,20 +174,24 @@ class RecordedTerm(Generic[P, R]):
         }
 
     def show(
-        self,
-        point: ParameterVector,
-        columns: Mapping[network.Output, FloatArray],
-        *,
-        changes: bool = False,
+        self, point: ParameterVector, columns: Mapping[network.Output, FloatArray]
     ) -> dict[str, FloatArray]:
-        """Compute the compared outputs (N, ...) as their channels show them; of `changes` of the
-        outputs those that they show."""
-        channels = self.plant.build_channels(point)
-        if changes:
-            channels = {name: replace(one, offset=0.0) for name, one in channels.items()}
+        """Compute the compared outputs (N,) as their channels show them."""
         return {
             name: one.show(self.record.time, columns[self.plant.outputs[name]])
-            for name, one in channels.items()
+            for name, one in self.plant.build_channels(point).items()
+        }
+
+    def _show_derivatives(
+        self, point: ParameterVector, found: NetworkSensitivities
+    ) -> dict[str, FloatArray]:
+        """Compute the derivatives (N, p) of the compared outputs as their channels show them."""
+        return {
+            name: channel.show_changes(
+                self.record.time, found.derivatives[one], found.run.columns[one]
+            )
+            for name, channel in self.plant.build_channels(point).items()
+            for one in [self.plant.outputs[name]]
         }
 
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
@@ -202,7 +206,7 @@ class RecordedTerm(Generic[P, R]):
         residual = self._compute_residual(point, found.run)
         if residual is None:
             return None
-        slopes = self.record.sample(self.show(point, found.derivatives, changes=True))
+        slopes = self.record.sample(self._show_derivatives(point, found))
         for name in apart:
             column = self._compute_slope(point, name, residual)
             if column is None:
