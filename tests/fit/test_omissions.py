@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +14,21 @@ from drivetwin.findings import Code
 from drivetwin.fit import omissions
 from drivetwin.fit.fit import fit_network, predict
 from drivetwin.fit.fixed_numbers import Tolerance
+from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.recording import Recording
 from drivetwin.fit.result import ModelFit
 from drivetwin.fit.synthesize import ModelName
-from tests.support.fits import fit_log, make_log
+from drivetwin.fit.unknown import Unknown
+from drivetwin.simulation.network import Output
+from tests.support.arrays import FloatArray
+from tests.support.fits import (
+    TWO_SIDED,
+    TWO_SIDED_NOISE,
+    fit_log,
+    make_log,
+    make_two_sided,
+    record_run,
+)
 
 LATE = 0.015
 
@@ -73,5 +85,42 @@ def test_drag_that_the_model_lacks_is_found() -> None:
     made = make_log(ModelName.CONVERTER_LOCK_UP)
     elements = [{**one, "aero": 0.0} if "aero" in one else one for one in made.model.elements]
     found = fit_network(replace(made.model, elements=elements), [made.recording])
-    assert list_shown(found) == ["drag at wheel"]
+    assert [one.partition(" or ")[0] for one in list_shown(found)] == ["drag at wheel"]
     require_truth(found, {key: made.truth[key] for key in made.truth if key != "load.constant"})
+
+
+def distort_torque(error: Callable[[FloatArray], FloatArray]) -> tuple[NetworkModel, Recording]:
+    """Return a model with the torque of a shaft as output, and a recording whose torque has an
+    `error`, both over its largest value."""
+    unknowns = {
+        "J": Unknown(0.08, paths=("motor.inertia",)),
+        "k": Unknown(300.0, paths=("left.stiffness",)),
+    }
+    outputs: dict[str, Output] = {**TWO_SIDED, "twist": ("shaft_torque", "left")}
+    model, torque = make_two_sided()
+    noise = {**TWO_SIDED_NOISE, "twist": 0.1}
+    recording = record_run(model.simulate(torque.time), {"torque": torque}, outputs, noise)
+    network = replace(model.describe(unknowns, outputs), inputs={})
+    exact = {name: Tolerance(exact=True) for name in ("left", "right", "gain")}
+    one = recording.outputs["twist"]
+    largest = np.max(np.abs(one.values))
+    wrong = replace(one, values=one.values + largest * error(one.values / largest))
+    outputs_read = {**recording.outputs, "twist": wrong}
+    return replace(network, tolerances=exact), replace(recording, outputs=outputs_read)
+
+
+@pytest.mark.parametrize(
+    ("error", "name"),
+    [
+        (lambda share: 0.01 * share * np.abs(share), "curve.twist"),
+        (lambda share: 0.01 + 0.0 * share, "offset.twist"),
+    ],
+)
+def test_an_error_of_a_torque_sensor_is_found(
+    error: Callable[[FloatArray], FloatArray], name: str
+) -> None:
+    model, recording = distort_torque(error)
+    found = fit_network(model, [recording])
+    assert any(name in one.split(" or ") for one in list_shown(found))
+    for key, value in {"J": 0.1, "k": 400.0}.items():
+        assert abs(found.values[key] - value) < 3.5 * found.std[key], key

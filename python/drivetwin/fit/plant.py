@@ -11,8 +11,6 @@ from typing import Any, Self
 
 import numpy as np
 
-import numpy as np
-
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.fit.fixed_numbers import FixedNumber
