@@ -133,13 +133,17 @@ def complete_model(found: OptimizeResult[Problem], stated: Collection[str]) -> C
     weighed = _weigh_all(found, candidates)
     while len(shown) < OMISSIONS.most:
         best = max(weighed, key=lambda one: one.nats, default=None)
-        if best is not None and best.weight >= 1.0:
+        played = [] if is_explained(found) else [_put_play(found, one) for one in plays]
+        plays = [one.omission for one in played if one.result is not None]
+        play = max(played, key=lambda one: one.nats, default=None)
+        rivals: list[_Rival] = []
+        if best is not None and best.weight >= 1.0 and (play is None or best.nats > play.nats):
             candidates = [one for one in candidates if one is not best.omission]
             nats, better = best.nats, _put_into_model(found, best)
             rivals = _list_rivals(best, weighed)
-        elif plays and not is_explained(found):
-            rivals = []
-            nats, better = _put_play(found, plays.pop())
+        elif play is not None and play.result is not None:
+            plays = [one for one in plays if one is not play.omission]
+            nats, better = play.nats, play.result
         else:
             break
         if better is not None:
@@ -378,20 +382,27 @@ def _weigh(one: Omission, own: float, pull: float, moves: FloatArray) -> _Weighe
     return _Weighed(one, size, evidence, amount, power, size * moves)
 
 
-def _put_play(
-    found: OptimizeResult[Problem], play: Omission
-) -> tuple[float, OptimizeResult[Problem] | None]:
-    """Minimise with a play; return the log evidence, and None where it is not shown."""
+@dataclass(frozen=True, eq=False)
+class _Played:
+    """Play with its log evidence, and the minimum with it; None where it is not shown."""
+
+    omission: Omission
+    nats: float
+    result: OptimizeResult[Problem] | None
+
+
+def _put_play(found: OptimizeResult[Problem], play: Omission) -> _Played:
+    """Minimise with a play."""
     problem, point = _admit(found, [play])
     first = minimise(problem, point)
     if first is None:
-        return 0.0, None
+        return _Played(play, 0.0, None)
     counted = max(first.normal.cost / problem.size, 1.0)
     nats = 0.5 * (found.normal.cost - first.normal.cost) / counted - OMISSIONS.occam
     if OMISSIONS.odds * math.exp(min(nats, 700.0)) < 1.0:
-        return nats, None
+        return _Played(play, nats, None)
     again = first.problem.update_weighting(first.point)
-    return nats, minimise(again, first.point)
+    return _Played(play, nats, minimise(again, first.point))
 
 
 def is_explained(found: OptimizeResult[Problem]) -> bool:
