@@ -131,14 +131,14 @@ usual size."""
 def add_offset(kind: str, time: FloatArray, values: FloatArray, size: float) -> FloatArray:
     """Add 0.3 % of the largest torque to a torque."""
     del time
-    return values + 0.003 * size * np.max(np.abs(values)) * (kind in TORQUES)
+    return np.asarray(values + 0.003 * size * np.max(np.abs(values)) * (kind in TORQUES))
 
 
 def add_curve(kind: str, time: FloatArray, values: FloatArray, size: float) -> FloatArray:
     """Let a torque be 0.5 % too large at its largest value, and exact at zero."""
     del time
     share = values * np.abs(values) / np.max(np.abs(values))
-    return values + 0.005 * size * share * (kind in TORQUES)
+    return np.asarray(values + 0.005 * size * share * (kind in TORQUES))
 
 
 def add_filter(kind: str, time: FloatArray, values: FloatArray, size: float) -> FloatArray:
