@@ -4,7 +4,7 @@
 A simulation with another order of events has a gradient that does not lead to the right one, so
 that a search from one start ends in a wrong minimum in every fifth case. A start near the
 measurement is refined at once. Otherwise draws are simulated, and the best of them are refined by
-the noise of the sensors alone; each round draws about the best so far.
+the noise of the sensors alone, in rounds.
 """
 
 from __future__ import annotations
@@ -41,10 +41,6 @@ class SearchSettings:
     [count]."""
     round_starts: int = 2
     """Draws of a round that are refined, the best [count]."""
-    parents: int = 8
-    """Best draws so far about which the next round draws [count]."""
-    shrinkage: float = 0.5
-    """Spread of the draws of a round over that of the round before [ratio]."""
     usual_spread: float = 0.3
     """Relative spread of the draws of a number without prior or bounds [ratio]."""
     far_ratio: float = 4.0
@@ -183,25 +179,18 @@ class _Screen:
         self.start = start
         self.spread = spread
         self.rng = rng
-        self.draws = np.empty((0, spread.size))
-        self.scores = np.empty(0)
 
     def draw(self, number: int) -> list[ParameterVector]:
-        """Return the best draws of a round that can be simulated: of the first about the start, of
-        later ones about the best so far."""
-        parents = np.tile(self.start.values, (SEARCH.draws, 1))
-        if number:
-            best = self.draws[np.argsort(self.scores, kind="stable")[: SEARCH.parents]]
-            parents = best[self.rng.integers(len(best), size=SEARCH.draws)]
-        scatter = self.spread * SEARCH.shrinkage**number
-        draws = parents + scatter * self.rng.standard_normal(parents.shape)
-        if number == 0:
-            draws[0] = self.start.values
+        """Return the best draws of a round that can be simulated; the first round has the start.
+
+        Each round draws anew: draws about the best so far lead to the minimum that is known.
+        """
+        scatter = self.rng.standard_normal((SEARCH.draws, self.spread.size))
+        scatter[0] *= number > 0
+        draws = self.start.values + self.spread * scatter
         draws = np.clip(draws, self.problem.lower, self.problem.upper)
         points = [self.start.replace_values(one) for one in draws]
         scores = np.array([compute_misfit(self.problem, one) for one in points])
-        self.draws = np.concatenate([self.draws, draws])
-        self.scores = np.concatenate([self.scores, scores])
         order = np.argsort(scores, kind="stable")[: SEARCH.round_starts]
         return [points[k] for k in order if np.isfinite(scores[k])]
 
