@@ -51,7 +51,7 @@ PARTS = ("preparation", "estimation")
 """Stages of an identification whose CPU time counts."""
 IDLE = 0.02
 """CPU time [s] of a stage in which no fit was run."""
-MODES = frozenset({Mechanism.SAMPLING_MODES, Mechanism.MODE_AVERAGE, Mechanism.FAR_MODES})
+MODES = frozenset({Mechanism.SAMPLING_MODES})
 """Mechanisms that have no object while all signals are taken as read."""
 GROUPS: Mapping[str, tuple[EffectId, ...]] = {
     "effects: wheel load": (EffectId.SLOW_LOAD, EffectId.AERO_LOAD, EffectId.BRAKE_DRAG),
@@ -153,13 +153,10 @@ def find_idle(found: Identification, stages: Mapping[str, float]) -> list[str]:
     fit = found.evidence.likelihood
     grows = fit is not None and AERO in fit.point.names
     is_selected = "model selection/other outputs" in stages
-    far = ("model selection/slow outputs", "model selection/other outputs")
     is_restricted = "model selection/restriction" in stages and not grows
     is_idle = {
         Mechanism.LOAD_GROWTH: is_selected and not grows,
         Mechanism.LOAD_TERMS: len(found.shifts) == 1 and not is_restricted,
-        Mechanism.FAR_MODES: all(stages.get(one, 0.0) < IDLE for one in far),
-        Mechanism.MODE_AVERAGE: "model selection/averaging" not in stages,
         Mechanism.BACKLASH_FIRST: is_selected,
         Mechanism.ADMISSION: all(one.code is not Code.EFFECT_EXCLUDED for one in found.findings),
         Mechanism.PLANTS: "plant/first refit" not in stages,

@@ -86,10 +86,8 @@ def format_table(outcomes: Outcomes) -> list[str]:
 
 
 STAGES: Mapping[str, tuple[str, ...]] = {
-    "far modes": ("model selection/slow outputs", "model selection/other outputs"),
     "load terms": ("model selection/restriction",),
     "other minima": ("model selection/minima",),
-    "mode average": ("model selection/averaging",),
     "plants": ("likelihood/plant",),
 }
 """Stages in which a mechanism acts."""

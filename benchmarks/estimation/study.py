@@ -16,7 +16,6 @@ from drivetwin.dyno.scenario import Scenario
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import DesignData, ShiftSignals
 from drivetwin.estimation.direct.friction_law import evaluate_stribeck
-from drivetwin.estimation.likelihood.effects.columns import EffectPriors
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.initial_guess import estimate_initial_values
 from drivetwin.estimation.likelihood.parametrization import LAW, DualClutchProblem
@@ -109,7 +108,7 @@ def compute_guess(bench: Bench) -> dict[str, float]:
 def fit_likelihood(bench: Bench) -> LikelihoodFit:
     """Fit by the likelihood method, as `identify` does."""
     law, guess = bench.run.scenario.model.loss_law, compute_guess(bench)
-    return select_model([bench.signals], [bench.driveline], law, guess, EffectPriors())[0]
+    return select_model([bench.signals], [bench.driveline], law, guess)[0]
 
 
 def build_truth(bench: Bench) -> dict[str, float]:

@@ -18,9 +18,7 @@ class Mechanism(StrEnum):
 
     LOAD_GROWTH = "load_growth"
     SAMPLING_MODES = "sampling_modes"
-    FAR_MODES = "far_modes"
     LOAD_TERMS = "load_terms"
-    MODE_AVERAGE = "mode_average"
     BACKLASH_FIRST = "backlash_first"
     ADMISSION = "admission"
     PLANTS = "plants"

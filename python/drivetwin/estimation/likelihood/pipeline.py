@@ -71,7 +71,7 @@ def _fit(
     """
     with _STAGES.enter("selection"):
         try:
-            best, notes = select_model(signals, drivelines, loss_law, guess, priors)
+            best, notes = select_model(signals, drivelines, loss_law, guess)
         except IdentificationError:
             found = (
                 _search_with_backlash(signals, drivelines, loss_law, guess, priors)

@@ -81,7 +81,7 @@ def identify_joint(logs: Sequence[PreparedLog]) -> Identification:
         try:
             _require_agreement(alone)
             guess = compute_start(alone)
-            fit, notes = select_model(signals, drivelines, design.loss_law, guess, priors)
+            fit, notes = select_model(signals, drivelines, design.loss_law, guess)
         except IdentificationError as fault:
             raise IdentificationError(
                 f"each of {len(logs)} logs can be explained, but not all by one set of parameters: "

@@ -30,7 +30,6 @@ from itertools import product
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.estimation.likelihood.effects.joint_step import WeightedColumns
 from drivetwin.estimation.likelihood.fit import LikelihoodFit
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
 from drivetwin.estimation.likelihood.multistart import MULTI_START, find_near_point, fit_local
@@ -58,14 +57,8 @@ deviations of its delay."""
 TIE = 6.0
 """Rise of the same below which the 95 % interval reaches the minimum of the other mode,
 whatever its weight: odds of 20."""
-UNLIKELY = 0.01
-"""Weight of a mode below which it is not fitted."""
-MATTERS = 0.5
-"""Spread of an unknown over the modes of a signal, in its standard deviations, worth a word."""
 WORSE = 1.1
 """Q per sample, as a factor, from which on other modes are surely no better."""
-SLOW = 4e-3
-"""Period of outputs [s] from which on half of it is too far away for an expansion."""
 ROUNDS = 3
 """Most changes of mode: far off, the expansion promises the way, not the end of it."""
 
@@ -87,7 +80,7 @@ def select_sampling_mode(
     problem: DualClutchProblem, start: ParameterVector
 ) -> tuple[ParameterVector, DualClutchProblem, DualClutchProblem]:
     """Return a point near the measurement, the problem, which has signals as read, with the modes
-    that promise least from there, and with the speeds, or all slow outputs, of the other mode.
+    that promise least from there, and with the speeds of the other mode.
 
     From far off an expansion promises anything: at ten times the noise, where logs without an
     output torque start, a mixture of modes by a thousand of Q. From there a minimum near the
@@ -100,7 +93,7 @@ def select_sampling_mode(
         if found is None and (near := find_near_point(problem, start)) is not None:
             found, start = _find_nearby_modes(problem, near, SEARCH.near_chi2), near
         modes = found or modes
-    other = modes ^ (_far_apart(problem) or frozenset(SPEEDS))
+    other = modes ^ frozenset(SPEEDS)
     return start, select_modes(problem, modes), select_modes(problem, other)
 
 
@@ -110,13 +103,7 @@ def _far_apart(problem: DualClutchProblem) -> frozenset[str]:
 
     That moves P0 and the delay of the engine torque by many standard deviations.
     """
-    if not problem.terms[0].compares(OUTPUT_TORQUE):
-        return frozenset(SPEEDS)
-    periods = [
-        out.get_period(one.record.time) for one in problem.terms for out in one.record.outputs
-    ]
-    is_slow = min(periods) > SLOW and is_enabled(Mechanism.FAR_MODES)
-    return _shown(problem) if is_slow else frozenset()
+    return frozenset() if problem.terms[0].compares(OUTPUT_TORQUE) else frozenset(SPEEDS)
 
 
 def _find_nearby_modes(
@@ -161,60 +148,6 @@ def refit_best_mode(problem: DualClutchProblem, best: LikelihoodFit) -> Likeliho
     )
 
 
-def refit_slow_outputs(problem: DualClutchProblem, best: LikelihoodFit) -> LikelihoodFit:
-    """The fit, or where the outputs of a log with an output torque are slow that with all of them
-    of the other mode, if it is likelier. `problem` has signals as read."""
-    outputs = _far_apart(problem)
-    if not outputs or not problem.terms[0].compares(OUTPUT_TORQUE):
-        return best
-    modes = get_modes(best.problem) ^ outputs
-    other = _nearby(select_modes(problem, modes), best, _start_of_other_outputs(best))
-    if other is None or _rise(problem, best, other) >= 0.0:
-        return best
-    try:
-        return refit_best_mode(problem, other)
-    except BudgetExceeded:
-        return other
-
-
-def refit_mode_beside(
-    problem: DualClutchProblem, best: LikelihoodFit, effects: WeightedColumns
-) -> LikelihoodFit:
-    """Fit with the sampling modes that are likeliest beside effects that the log shows.
-
-    What an effect does may look like half a sample. `problem` has signals as read.
-    """
-    choices = _choices(best.problem, best.point, best.normal, effects)
-    modes = _flipped(get_modes(best.problem), choices.flips[int(np.argmin(choices.left))])
-    if modes == get_modes(best.problem):
-        return best
-    return _nearby(select_modes(problem, modes), best, best.point) or best
-
-
-def average_modes(
-    problem: DualClutchProblem, best: LikelihoodFit, effects: WeightedColumns | None = None
-) -> tuple[LikelihoodFit, list[Finding]]:
-    """The fit with mean and covariance over all modes, weighted by their likelihood, and findings
-    on modes that the log hardly determines.
-
-    The minima of two modes may lie six standard deviations apart and one sample in twenty thousand
-    decide between them; an interval about one of them would be wrong as often as that is the wrong
-    one (Burnham and Anderson 2002). `problem` has signals as read. By the expansion none gets more
-    weight than the modes of the fit; those that would matter are fitted. With `effects` the
-    expansion has them too, and nothing is fitted: a fit would lack them.
-    """
-    choices = _choices(best.problem, best.point, best.normal, effects)
-    choices = _fitted(problem, best, choices) if effects is None else choices.centre()
-    weight = _weights(choices, best)
-    step = weight @ choices.steps
-    apart = choices.steps - step
-    reached = np.where(choices.left < np.min(choices.left) + TIE, Z95**-2, 0.0)
-    values = np.clip(best.point.values + step, best.problem.lower, best.problem.upper)
-    covariance = best.covariance + apart.T @ (np.maximum(weight, reached)[:, None] * apart)
-    averaged = replace(best, mean=best.point.replace_values(values), covariance=covariance)
-    return averaged, _doubts(choices, weight, np.sqrt(np.diag(best.covariance)))
-
-
 def widen_over_modes(
     problem: DualClutchProblem, best: LikelihoodFit
 ) -> tuple[LikelihoodFit, list[Finding]]:
@@ -254,36 +187,6 @@ def _start_of_other_outputs(best: LikelihoodFit) -> ParameterVector:
             half = 0.5 * speed.get_period(record.time)
             values[best.point.names.index(name)] += half if speed.window == 0.0 else -half
     return best.point.replace_values(np.clip(values, best.problem.lower, best.problem.upper))
-
-
-def _weights(choices: _Choices, best: LikelihoodFit) -> FloatArray:
-    """Likelihood (q,) of each choice, all together 1."""
-    weight = np.exp(-0.5 * (choices.left - np.min(choices.left)) / max(best.chi2, 1.0))
-    return np.asarray(weight / np.sum(weight))
-
-
-def _fitted(problem: DualClutchProblem, best: LikelihoodFit, choices: _Choices) -> _Choices:
-    """The choices as seen from the minimum of the first, those fitted that would matter: what an
-    expansion says of a minimum far away is too rough to weigh it by.
-
-    Of its many kinks Q may end some lower by another search alone, so the first modes are searched
-    again from where those went that seem as likely.
-    """
-    seen = choices.centre()
-    left, steps = seen.left, seen.steps
-    far = np.max(np.abs(steps) / np.sqrt(np.diag(best.covariance)), axis=1) > MATTERS
-    for k in np.flatnonzero(far & (_weights(seen, best) > UNLIKELY)):
-        modes = _flipped(get_modes(best.problem), choices.flips[k])
-        other = _nearby(select_modes(problem, modes), best, best.point)
-        if other is None:
-            left[k] = np.inf
-            continue
-        left[k] = _rise(problem, best, other)
-        steps[k] = other.point.values - best.point.values
-        first = select_modes(problem, get_modes(best.problem))
-        if left[k] < TIE and (back := _nearby(first, other, other.point)):
-            left[0] = min(left[0], _rise(problem, best, back))
-    return seen
 
 
 def _nearby(
@@ -326,17 +229,6 @@ def _estimate_rise_std(one: LikelihoodFit, other: LikelihoodFit) -> float:
     return float(np.sqrt(power))
 
 
-def _doubts(choices: _Choices, weight: FloatArray, std: FloatArray) -> list[Finding]:
-    """Return a finding for signals whose mode is uncertain and moves an unknown against its `std`
-    (p,); `weight` (q,) is that of each choice."""
-    single = np.sum(choices.flips, axis=1) == 1.0
-    moves = choices.flips[single].T @ np.abs(choices.steps[single]) / std
-    share = weight @ choices.flips
-    spread = np.sqrt(share * (1.0 - share)) * np.max(moves, axis=1)
-    names = [n.replace("_", " ") for n, k in zip(SIGNALS, spread, strict=True) if k > MATTERS]
-    return [report(Code.SAMPLING_UNCERTAIN, channels=", ".join(names))] if names else []
-
-
 def report_modes(modes: frozenset[str]) -> list[Finding]:
     """Report the signals that are not as read."""
     means = ", ".join(name.replace("_", " ") for name in OUTPUTS if name in modes)
@@ -375,43 +267,28 @@ def _shown(problem: DualClutchProblem) -> frozenset[str]:
 class _Choices:
     """Every way to take the signals, the one at hand first: `flips` (q, m) of `SIGNALS` are 1 where
     one is of the other mode than now, `left` (q,) is what modes compare by with their price,
-    less a constant, and `steps` (q, p) is how the unknowns follow."""
+    less a constant."""
 
     flips: FloatArray
     left: FloatArray
-    steps: FloatArray
-
-    def centre(self) -> _Choices:
-        """Return the choices as seen from the first; none gets more weight than that."""
-        left = np.maximum(self.left - self.left[0], 0.0)
-        return replace(self, left=left, steps=self.steps - self.steps[0])
 
 
 def _choices(
     problem: DualClutchProblem,
     point: ParameterVector,
     normal: NormalEquations,
-    effects: WeightedColumns | None = None,
 ) -> _Choices:
-    """Expand Q at `point` over all choices by `normal`, with the weighting there.
-
-    With `effects` their amounts are further unknowns, of unit prior variance.
-    """
+    """Expand Q at `point` over all choices by `normal`, with the weighting there."""
     changes = [_changes(term, point) for term in problem.terms]
     score = compute_column_products(problem, normal, changes)
-    gradient, information, cross = normal.gradient, normal.information, score.cross
-    if effects is not None:
-        gradient, information = effects.join(normal.information)
-        answers = sum(w.T @ one for w, one in zip(effects.weighted, changes, strict=True))
-        cross = np.vstack([cross, np.asarray(answers)])
     shown = {*_shown(problem), TORQUE} if is_enabled(Mechanism.SAMPLING_MODES) else set()
     flips = np.array(list(product(*((0.0, 1.0) if n in shown else (0.0,) for n in SIGNALS))))
-    gradients = gradient + flips @ cross.T
-    steps = np.array([solve_step(information, one) for one in gradients])
+    gradients = normal.gradient + flips @ score.cross.T
+    steps = np.array([solve_step(normal.information, one) for one in gradients])
     price = np.array([_price(problem, _flipped(get_modes(problem), row)) for row in flips])
     followed = np.sum(gradients * steps, axis=1)
     before = np.sum((flips @ score.own) * flips, axis=1) - 2.0 * flips @ score.pull
-    return _Choices(flips, before + followed + price, steps[:, : point.values.size])
+    return _Choices(flips, before + followed + price)
 
 
 def _changes(term: DualClutchTerm, point: ParameterVector) -> FloatArray:

@@ -19,8 +19,6 @@ from drivetwin._util.progress import TimedStages
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.data.shift_data import KnownDriveline, ShiftSignals
 from drivetwin.estimation.direct.load_balance import AERO
-from drivetwin.estimation.likelihood.effects.columns import EffectPriors
-from drivetwin.estimation.likelihood.effects.expansion import expand_effects
 from drivetwin.estimation.likelihood.effects.shaft import ROUNDING
 from drivetwin.estimation.likelihood.fit import LikelihoodFit, PlantEvidence, locate_bounds
 from drivetwin.estimation.likelihood.mechanism import Mechanism, is_enabled
@@ -47,11 +45,8 @@ from drivetwin.estimation.likelihood.selection.plants import (
     extend_problem,
 )
 from drivetwin.estimation.likelihood.selection.sampling_mode import (
-    average_modes,
     get_modes,
     refit_best_mode,
-    refit_mode_beside,
-    refit_slow_outputs,
     report_modes,
     select_modes,
     select_sampling_mode,
@@ -88,7 +83,7 @@ LEVEL = "mu_c"
 """Coefficient of a friction law by which draws scale it."""
 _STAGES = TimedStages(
     "model selection",
-    ("search", "bounds", "slow outputs", "restriction", "averaging", "other outputs"),
+    ("search", "bounds", "restriction", "other outputs"),
 )
 
 
@@ -97,12 +92,8 @@ def select_model(
     drivelines: Sequence[KnownDriveline],
     loss_law: LossLaw,
     guess: Mapping[str, float],
-    priors: EffectPriors,
 ) -> tuple[LikelihoodFit, tuple[Finding, ...]]:
     """Fit the variant that the log supports; return the decisions as findings.
-
-    Sampling modes are chosen beside the effects that the log shows, with their `priors`, and
-    averaged beside all effects.
 
     Raises IdentificationError where no variant converges.
     """
@@ -114,11 +105,6 @@ def select_model(
         best = fit_candidates(problem, start)
     with _STAGES.enter("bounds"), limit_evaluations(min(MAX_REFIT_WORK, search.left)):
         best = retry_from_card(problem, best)
-    with (
-        _STAGES.enter("slow outputs", "modes of signals"),
-        limit_evaluations(MAX_REFIT_WORK),
-    ):
-        best = refit_slow_outputs(problem, best)
     with _STAGES.enter("restriction"), limit_evaluations(SELECTION.max_restricted_work):
         is_chosen = is_enabled(Mechanism.LOAD_TERMS)
         absent, point = find_absent_terms(best) if is_chosen else ([], best.point)
@@ -127,40 +113,13 @@ def select_model(
         narrower = build_problem(signals, drivelines, loss_law, guess, hilly=hilly)
         best, problem = _restrict(best, point, narrower) or (best, problem)
     notes = _report_growth(best)
-    with (
-        _STAGES.enter("averaging", "modes of signals"),
-        limit_evaluations(min(MAX_REFIT_WORK, search.left)),
-    ):
-        best, doubts = (
-            _average_modes(problem, best, priors)
-            if is_enabled(Mechanism.MODE_AVERAGE)
-            else (best, [])
-        )
     with _STAGES.enter("other outputs"), limit_evaluations(MAX_REFIT_WORK):
         best, either = widen_over_modes(problem, best)
     return best, (
         *notes,
         *report_modes(get_modes(best.problem)),
-        *dict.fromkeys((*doubts, *either)),
+        *either,
     )
-
-
-def _average_modes(
-    problem: DualClutchProblem, best: LikelihoodFit, priors: EffectPriors
-) -> tuple[LikelihoodFit, list[Finding]]:
-    """Average over sampling modes, with the effects as further unknowns.
-
-    Half a sample of one signal may take the place of an effect, so that the log shows neither. The
-    fit itself changes its modes only beside effects that are shown.
-    """
-    found = expand_effects(best, priors)
-    if found is None:
-        return average_modes(problem, best)
-    if any(group.effect for group in found.shown):
-        other = refit_mode_beside(problem, best, found.sums)
-        if other is not best:
-            best, found = other, expand_effects(other, priors)
-    return average_modes(problem, best, None if found is None else found.sums)
 
 
 def _restrict(
