@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -107,6 +108,9 @@ def test_report_shows_limits_profiles_and_definitions(folder: Path) -> None:
     page = (folder / "report.html").read_text(encoding="utf-8")
     for text in ("Limits; the upper bound", "vibration dose value", "ISO 2631-1", "kiss_pressure"):
         assert text in page
+    numbers = page.partition("Metrics over the fresh draws")[2].partition("</table>")[0]
+    assert numbers
+    assert not re.search(r"\de-\d\d", numbers)  # a round-off of 1e-11 rpm is no flare
 
 
 def test_starts_from_a_calibration(

@@ -56,7 +56,7 @@ class NameTable:
 
 
 _ASIDE = re.compile(r"\\.*$|\[[^\]]*\]|(?:_\d+ms|_+x?(?:etkc?|ccp|cp)_\d+)$", re.DOTALL)
-"""Parts of a name beside the quantity: device (`\\XETK:1`, in other files `_XETK_1`), unit, raster."""
+"""Parts of a name beside the quantity: device (`\\XETK:1`, elsewhere `_XETK_1`), unit, raster."""
 
 
 def normalise_name(name: str) -> str:

@@ -33,6 +33,7 @@ from drivetwin.report.blocks import (
     make_notes,
     make_number,
     make_table,
+    make_tables,
 )
 from drivetwin.report.figure import (
     MEASURED,
@@ -186,7 +187,7 @@ def _build_sections(found: Calibration, findings: Sequence[Finding]) -> list[Sec
             "parameters",
             "Parameters",
             "Policy before and after.",
-            [_build_bounds(found), _build_values(found)],
+            [*_build_bounds(found), _build_values(found)],
         ),
         Section("definitions", "Metrics", "Definition and source.", [_build_definitions()]),
     ]
@@ -224,7 +225,7 @@ def build_calibration_blocks(
     return [
         *_build_headline(found),
         *(_build_limits(found), _build_statistics(found), _build_events(found)),
-        *(_build_shares(found), _build_bounds(found)),
+        *(_build_shares(found), *_build_bounds(found)),
         *tables,
         *build_findings_section(findings).blocks,
     ]
@@ -312,7 +313,8 @@ def _build_statistics(found: Calibration) -> TableBlock:
                 *(q.median, q.mean, q.share_95, q.upper_95),
                 *(q.share_99, q.upper_99, q.worst, q.promised),
             )
-            scaled = (None if v is None else f"{v * display.factor:.4g}" for v in values)
+            # A flare of 1e-11 rpm is round-off.
+            scaled = (None if v is None else f"{round(v * display.factor, 9):.4g}" for v in values)
             label = f"{spec.label} [{display.label}]" if part == "before" else ""
             rows.append((label, part, *scaled))
     columns: Sequence[Column] = (
@@ -373,14 +375,14 @@ def get_parameter_display(unit: str) -> Display:
     return get_display_unit(unit) if unit in ("Pa", "Pa/s") else Display(spell_unit(unit))
 
 
-def _build_bounds(found: Calibration) -> TableBlock:
+def _build_bounds(found: Calibration) -> list[Block]:
     rows = [
         (one.name, at.label, end * at.factor, "lower" if end == one.low else "upper", one.text)
         for one, end in found.task.policy.list_at_bounds(found.after.values)
         for at in [get_parameter_display(one.unit)]
     ]
     columns: Sequence[Column] = ("parameter", "unit", ("bound", ".5g"), "side", "meaning")
-    return make_table(f"Bounds that bind: {len(rows)}", columns, rows)
+    return make_tables(f"Bounds that bind: {len(rows)}", columns, rows)
 
 
 def _build_definitions() -> TableBlock:
