@@ -106,3 +106,16 @@ def test_a_prior_that_the_recordings_contradict_limits_all_values() -> None:
     assert right.status is ModelStatus.VALID
     (warned,) = (one for one in right.findings if one.code is Code.PRIOR_MISSED)
     assert "shaft.gap is 0.02" in warned.text
+
+
+def test_a_bound_that_the_recordings_contradict_limits_all_values() -> None:
+    made = make_log(ModelName.TIP_IN)
+    bounded = {**made.model.unknowns, "shaft.gap": Unknown(0.023, bounds=(0.022, 0.04))}
+    found = fit_network(replace(made.model, unknowns=bounded), [made.recording])
+    (finding,) = (one for one in found.findings if one.code is Code.AT_BOUND)
+    assert "shaft.gap = 0.02200 rad is the bound" in finding.text
+    assert "a smaller value" in finding.text
+    assert Verdict.IDENTIFIED not in {one.verdict for one in found.estimates.values()}
+    apart = {**made.model.unknowns, "shaft.gap": Unknown(0.018, bounds=(0.01, 0.04))}
+    right = fit_network(replace(made.model, unknowns=apart), [made.recording])
+    assert right.status is ModelStatus.VALID

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
+from drivetwin._util.display_units import format_with_unit
 from drivetwin.errors import InputError, suggest_spelling
 from drivetwin.estimation.result.estimate import (
     Z95,
@@ -324,6 +325,20 @@ def _find_contradicted(
             yield report(code, unknown=one.name, found=found, stated=stated)
 
 
+def _find_bounded(
+    minimum: OptimizeResult[Problem], covariance: FloatArray, sought: Sequence[SoughtNumber]
+) -> Iterator[Finding]:
+    """Find unknowns at a bound without which Q would fall by the square of a contradiction."""
+    pull = np.sqrt(np.diag(covariance)) * minimum.normal.gradient
+    values, problem = minimum.point.values, minimum.problem
+    beyond = np.where(pull < 0.0, values >= problem.upper, values <= problem.lower)
+    for k, one in enumerate(sought):
+        if beyond[k] and abs(pull[k]) > PRIOR.contradiction:
+            value, unit = one.to_value(float(values[k])), one.spec.unit
+            limit = f"{one.name} = {format_with_unit(value, unit)}"
+            yield report(Code.AT_BOUND, limit=limit, side="larger" if pull[k] < 0.0 else "smaller")
+
+
 def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum) -> ModelFit:
     """Judge the unknowns and the model at a minimum."""
     minimum, sought = found.result, numbers.sought
@@ -350,6 +365,7 @@ def conclude(model: NetworkModel, numbers: ResolvedNumbers, found: FoundMinimum)
         *failures,
         *ended,
         *(_find_contradicted(listed) if is_explained else ()),
+        *_find_bounded(minimum, covariance, sought),
         *_report_omissions(found.shown, moved),
         *doubts,
         *(one for one in remarks if one is not None),
