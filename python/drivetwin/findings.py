@@ -64,6 +64,7 @@ class Code(StrEnum):
     RATIO_DEVIATES = auto()
     RATIO_UNKNOWN = auto()
     PRESSURES_EXCHANGED = auto()
+    PRESSURES_ABSOLUTE = auto()
     TORQUE_PHASE_EMPTY = auto()
     TORQUE_PHASE_SHARED_CLUTCH = auto()
     TORQUE_PHASE_FROM_TORQUE = auto()

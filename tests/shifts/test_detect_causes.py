@@ -63,3 +63,14 @@ def test_pressures_in_another_unit_get_the_remedy_of_their_channel() -> None:
     with pytest.raises(DrivetwinError, match="pressures contradict the speeds") as refusal:
         refuse_without_shifts(log, card, drivetwin.detect_shifts(log, card))
     assert "unit and offset of pressure.B3" in refusal.value.remedy
+
+
+def test_absolute_pressures_are_named() -> None:
+    log, card = read_run(run(load_scenario("paper_steps"), seed=1))
+    found = drivetwin.detect_shifts(log, card)
+    assert check_card(card, log, found.shifts) == ()
+    roles = ("pressure.B2", "pressure.B3")
+    absolute = {role: replace(log[role], values=log[role].values + 1.013e5) for role in roles}
+    log = replace(log, channels={**log.channels, **absolute})
+    codes = [one.code for one in check_card(card, log, found.shifts)]
+    assert codes == [Code.PRESSURES_ABSOLUTE]

@@ -32,6 +32,9 @@ ABOVE = 1.2
 """Least ratio of the largest pressure of an element that engages to its P0."""
 DRAG = 0.3
 """Pressure above P0 that an open element may have [bar]: sensor offset, prefill."""
+AMBIENT, LOWEST = (0.85, 1.1), 0.05
+"""Pressure of the air from 1,400 m to sea level, with the offset of a sensor [bar], and the share
+of the samples below the resting pressure of an open element."""
 
 
 def check_pressures(
@@ -47,6 +50,14 @@ def check_pressures(
         if element not in doubted
     }
     return list(findings.values())
+
+
+def _check_ambient(log: ShiftLog, card: VehicleCard) -> Iterator[Finding]:
+    """Report pressures of which none falls below, and all fall to, that of the ambient air."""
+    roles = [role for role in map(make_pressure_role, card.elements) if role in log]
+    lowest = [float(np.nanquantile(log[role].values, LOWEST)) / BAR for role in roles]
+    if len(lowest) > 1 and AMBIENT[0] < min(lowest) and max(lowest) < AMBIENT[1]:
+        yield report(Code.PRESSURES_ABSOLUTE, low=min(lowest), high=max(lowest))
 
 
 def _check_largest(log: ShiftLog, card: VehicleCard) -> Iterator[tuple[str, Finding]]:
@@ -123,7 +134,7 @@ def check_card(
         return tuple(found)
     if OUTPUT_INERTIA in {one.place.key for one in found}:
         card = replace(card, J_out=None)
-    causes = find_causes(log, card)
+    causes = (*find_causes(log, card), *_check_ambient(log, card))
     differing = check_ratios(log, card)
     found += differing
     if any(one.code is Code.PRESSURES_EXCHANGED for one in causes):
