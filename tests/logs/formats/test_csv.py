@@ -324,6 +324,12 @@ def test_several_time_columns_keep_one_origin() -> None:
     assert [one.time.tolist() for one in log.channels] == [[0.003], [0.0]]
 
 
+def test_a_summary_below_the_rows_is_refused_with_its_line() -> None:
+    with pytest.raises(TimeError, match="line 5: 'Mean' is no number") as refusal:
+        read("time,x\ns,Nm\n0,1\n0.1,2\nMean,1.5\n")
+    assert "remove that line if it is a summary" in refusal.value.remedy
+
+
 def test_a_value_beside_no_stamp_of_its_own_is_refused() -> None:
     with pytest.raises(TimeError, match=r"channel 'y': line 3 has no time stamp"):
         read("t1 [s],x [Nm],t2 [s],y [Nm]\n0,1,0,2\n1,2,,3\n")
