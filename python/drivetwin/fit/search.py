@@ -36,9 +36,8 @@ class FitSearchSettings:
 
     points: int = 800
     """Points of the grid on the way to the minimum, about [count]."""
-    work: float = 1500.0
-    """Work of all starts: 3 to 8 times that of the starts of a recording that the model explains
-    [passes]."""
+    work: float = 2500.0
+    """Work of all starts: four rounds of draws [passes]."""
 
 
 FIT_SEARCH = FitSearchSettings()
@@ -118,9 +117,9 @@ def _seek(problem: Problem, start: ParameterVector, spread: FloatArray, seed: in
     attempts = Attempts(coarse)
     with suppress(BudgetExceeded), limit_evaluations(FIT_SEARCH.work) as budget:
         attempts.refine(start)
-        if not _is_explained(attempts.chi2, coarse.size):
+        if not _is_settled(attempts):
             for _ in refine_draws(attempts, start, spread, seed):
-                if _is_explained(attempts.chi2, coarse.size):
+                if _is_settled(attempts):
                     break
     if not attempts.starts:
         raise IdentificationError(
@@ -162,10 +161,17 @@ def _coarsen(problem: Problem) -> Problem:
     return replace(problem, terms=tuple(terms))
 
 
-def _is_explained(chi2: float, size: int) -> bool:
-    """Return whether Q per sample is 1 within its scatter, for so many samples: a wrong minimum may
-    be no more than 3 % above it."""
-    return chi2 < 1.0 + 3.0 * float(np.sqrt(2.0 / size))
+def _is_explained(chi2: float, size: int, deviations: float = 3.0) -> bool:
+    """Return whether Q per sample is 1 within so many standard deviations of its scatter."""
+    return chi2 < 1.0 + deviations * float(np.sqrt(2.0 / size))
+
+
+def _is_settled(attempts: Attempts[Problem]) -> bool:
+    """Return whether the best start needs no other: it explains the recordings, and where its Q is
+    beyond one standard deviation of the scatter, another start has led to it. A wrong minimum may
+    be no more than 3 % above the right one."""
+    least = 1.0 if attempts.agreeing < 2 else 3.0
+    return _is_explained(attempts.chi2, attempts.problem.size, least)
 
 
 def _is_far(cost: float, size: int) -> bool:

@@ -93,9 +93,18 @@ class Attempts(Generic[P]):
     @property
     def agreeing(self) -> int:
         """Number of starts that led to the best minimum."""
+        return sum(self._compare())
+
+    def is_confirmed(self, first: int) -> bool:
+        """Return whether one of the `first` starts and a later one led to the best minimum."""
+        agreeing = self._compare()
+        return any(agreeing[:first]) and any(agreeing[first:])
+
+    def _compare(self) -> list[bool]:
+        """Compare each start with the best one: whether it led to the same minimum."""
         best = self.best.cost if self.starts else np.inf
         apart = SEARCH.same_cost + GAUSS_NEWTON.rough_rtol * best
-        return sum(one.cost - best < apart for one in self.starts)
+        return [one.cost - best < apart for one in self.starts]
 
     @property
     def chi2(self) -> float:
@@ -148,12 +157,12 @@ def refine_draws(
     screen = _Screen(attempts.problem, start, spread, np.random.default_rng(seed))
     share = 1.0 / SEARCH.rounds
     for number in range(SEARCH.rounds):
-        known = attempts.agreeing
+        known = len(attempts.starts)
         with scale_progress(share * number, share * (number + 1)):
-            for candidate in screen.draw(number):
+            for candidate in screen.draw(with_start=not attempts.starts):
                 attempts.refine(candidate)
                 yield
-                if 0 < known < attempts.agreeing:
+                if attempts.is_confirmed(known):
                     return
 
 
@@ -162,7 +171,7 @@ def find_best_draw(
 ) -> ParameterVector:
     """Return the best of the draws about a start; the start where none can be simulated."""
     screen = _Screen(problem, start, spread, np.random.default_rng(0))
-    return next(iter(screen.draw(0)), start)
+    return next(iter(screen.draw(with_start=True)), start)
 
 
 class _Screen:
@@ -180,13 +189,14 @@ class _Screen:
         self.spread = spread
         self.rng = rng
 
-    def draw(self, number: int) -> list[ParameterVector]:
-        """Return the best draws of a round that can be simulated; the first round has the start.
+    def draw(self, *, with_start: bool) -> list[ParameterVector]:
+        """Return the best draws of a round that can be simulated, the start among them or not: a
+        start that is refined twice agrees with itself.
 
         Each round draws anew: draws about the best so far lead to the minimum that is known.
         """
         scatter = self.rng.standard_normal((SEARCH.draws, self.spread.size))
-        scatter[0] *= number > 0
+        scatter[0] *= not with_start
         draws = self.start.values + self.spread * scatter
         draws = np.clip(draws, self.problem.lower, self.problem.upper)
         points = [self.start.replace_values(one) for one in draws]
