@@ -183,7 +183,7 @@ def compare_plants(
 def _build_fit(
     fit: LikelihoodFit, found: OptimizeResult[DualClutchProblem], plant: PlantEvidence
 ) -> LikelihoodFit:
-    """Build the fit of an extended plant; it has the average over sampling modes of `fit`."""
+    """Build the fit of an extended plant, with what models beside `fit` add to its covariance."""
     problem, point, normal = found.problem, found.point, found.normal
     chi2 = (normal.cost - problem.prior.compute_prior_cost(point.values)) / problem.size
     own, added = fit.covariance - fit.noise_covariance, point.values.size - plant.index

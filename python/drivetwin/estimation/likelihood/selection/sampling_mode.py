@@ -5,7 +5,7 @@ An output may be the mean over the time since the sample before, as encoders on 
 is half a sample late, and half a millisecond between torque and speed moves k_o and c_o by several
 standard deviations. Between its samples an engine torque may be straight or a curve
 (`compute_bend`). Which mode may fit better follows from the expansion of Q for one of them: that of
-the others differs by a known column each. Where it hardly decides, the unknowns are averaged.
+the others differs by a known column each.
 
 Where all outputs are of the other mode, which is nearly a delay of the inputs, fits compare by
 their deviance and not by Q: with θ the unknowns, y the samples and δ the noise of the inputs u, of
@@ -98,8 +98,8 @@ def select_sampling_mode(
 
 
 def _far_apart(problem: DualClutchProblem) -> frozenset[str]:
-    """The outputs of which half a period is nearly a delay of the inputs and too far away for an
-    expansion: the speeds of a log without an output torque, and all outputs where they are slow.
+    """Return the outputs of which half a period is nearly a delay of the inputs, beyond the reach
+    of an expansion: the speeds of a log without an output torque.
 
     That moves P0 and the delay of the engine torque by many standard deviations.
     """
