@@ -120,7 +120,7 @@ def build_truth(bench: Bench) -> dict[str, float]:
 
 def read_fit(fit: LikelihoodFit, bench: Bench) -> Estimates:
     """Return value and standard deviation of every parameter of a fit."""
-    return propagate(fit.problem, fit.mean, fit.covariance, bench.signals)
+    return propagate(fit.problem, fit.point, fit.covariance, bench.signals)
 
 
 def compute_bounds(scenario: Scenario, know: Knowledge) -> dict[str, float]:

@@ -221,9 +221,9 @@ def measure_move(
         return None
     if fit is None or fit.plant is not None:
         return Move(np.inf, np.inf)
-    values = dict(zip(fit.mean.names, fit.mean.values.tolist(), strict=True))
+    values = dict(zip(fit.point.names, fit.point.values.tolist(), strict=True))
     std = np.sqrt(np.diag(other.noise_covariance))
-    rows = zip(other.mean.names, other.mean.values.tolist(), std.tolist(), strict=True)
+    rows = zip(other.point.names, other.point.values.tolist(), std.tolist(), strict=True)
     moves = [
         abs(values[name] - value) / spread
         for name, value, spread in rows

@@ -101,7 +101,7 @@ def fit_both(seed: int) -> tuple[Fitted, Fitted]:
     problem, start = build_problem([bench.signals], [bench.driveline], law, guess)
     first = time.process_time() - began
     found = fit_multistart(problem, start)
-    values = propagate(problem, found.mean, found.covariance, bench.signals)
+    values = propagate(problem, found.point, found.covariance, bench.signals)
     likelihood = Fitted(values, time.process_time() - began)
     began = time.process_time()
     network = _fit_network(bench, problem, start)

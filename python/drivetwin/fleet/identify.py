@@ -120,7 +120,7 @@ def _get_posterior(
     place = [fit.point.names.index(name) for name in wanted]
     inverse = invert_information(fit.normal.information)
     rows = np.ix_(place, place)
-    return fit.mean.values[place], inverse[rows], fit.covariance[rows]
+    return fit.point.values[place], inverse[rows], fit.covariance[rows]
 
 
 _CARDS = 64

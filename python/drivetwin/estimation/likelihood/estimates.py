@@ -264,7 +264,7 @@ def _check_other_law(
 
     `slopes` are the derivatives (p,) of the parameters by the unknowns, by id.
     """
-    values = compute_parameters(fit.problem, fit.mean, signals)
+    values = compute_parameters(fit.problem, fit.point, signals)
     matrix = np.array([slopes[name] for name in values])
     return check_other_law(fit, values, matrix, _compute_std(matrix, fit.covariance))
 

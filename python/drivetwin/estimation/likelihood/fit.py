@@ -40,9 +40,8 @@ class PlantEvidence:
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodFit:
-    """Minimum of Q at `point` with the estimate of the unknowns: `mean`, `covariance` (p, p).
+    """Minimum of Q at `point` with the covariance (p, p) of the unknowns.
 
-    `mean` is the minimum, or the average over minima of similar likelihood (sampling_mode.py).
     `chi2` is Q per sample less the prior; `problem` holds the weighting at the minimum and `normal`
     the expansion of Q there. The covariance is that of `compute_covariance`. `plant` describes the
     element beside the dual clutch; its unknowns come last, that of the size first.
@@ -50,7 +49,6 @@ class LikelihoodFit:
 
     problem: DualClutchProblem
     point: ParameterVector
-    mean: ParameterVector
     covariance: FloatArray
     normal: NormalEquations
     chi2: float

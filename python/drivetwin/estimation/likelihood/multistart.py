@@ -228,4 +228,4 @@ def fit_local(
         return None
     covariance = compute_covariance(found.problem, found.normal, chi2)
     point, count = found.point, found.iterations
-    return LikelihoodFit(found.problem, point, point, covariance, found.normal, chi2, count)
+    return LikelihoodFit(found.problem, point, covariance, found.normal, chi2, count)

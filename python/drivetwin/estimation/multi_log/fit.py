@@ -186,7 +186,7 @@ def _compute_shared_mean(fit: LikelihoodFit) -> _SharedMean:
         k for k, name in enumerate(fit.point.names) if name not in {*starts, *LOG_SPECIFIC, AERO}
     ]
     names = [fit.point.names[k] for k in keep]
-    return names, fit.mean.values[keep], invert_information(fit.covariance[np.ix_(keep, keep)])
+    return names, fit.point.values[keep], invert_information(fit.covariance[np.ix_(keep, keep)])
 
 
 def _compute_weighted_mean(means: Sequence[_SharedMean]) -> dict[str, float]:

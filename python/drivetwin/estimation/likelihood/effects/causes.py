@@ -297,7 +297,7 @@ def widen_by_rivals(correction: Correction, fit: LikelihoodFit, cause: Cause | N
         if group.effect is not None and one.columns and cause.evidence - one.nats < LEAD
     ]
     weights = np.exp([one.nats - cause.evidence for one in near])
-    applied = correction.mean.values - fit.mean.values
+    applied = correction.mean.values - fit.point.values
     apart = np.array([one.moves[: applied.size] - applied for one in near])
     extra = (apart.T * (weights / weights.sum())) @ apart
     return replace(correction, covariance=correction.covariance + extra)

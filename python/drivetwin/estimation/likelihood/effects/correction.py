@@ -192,7 +192,7 @@ def keep_fit(fit: LikelihoodFit) -> Correction:
         contributions={},
     )
     return Correction(
-        mean=fit.mean,
+        mean=fit.point,
         covariance=fit.covariance,
         noise=fit.covariance,
         inverse=inverse,
@@ -315,10 +315,10 @@ def _conclude(
     rest = step.moves - chosen.moves
     extra = _compute_model_spread(fit)
     spread = compute_size_spread(step, sizes)
-    values = fit.mean.values + base.point.values - fit.point.values + chosen.moves
-    mean = fit.mean.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper))
+    values = base.point.values + chosen.moves
+    mean = fit.point.replace_values(np.clip(values, fit.problem.lower, fit.problem.upper))
     if any(term.evaluate(mean) is None for term in fit.problem.terms):
-        mean, last = fit.mean, np.full_like(last, np.inf)  # no vehicle has such values
+        mean, last = fit.point, np.full_like(last, np.inf)  # no vehicle has such values
     return Correction(
         mean,
         (step.covariance + spread)[:size, :size] + np.outer(rest, rest) + extra,

@@ -237,7 +237,7 @@ def collect_loads(fit: LikelihoodFit) -> tuple[float, ...]:
     structures = [term.plant for term in fit.problem.terms]
     if not any(one.load_factors for one in structures):
         return ()
-    return tuple(one.compute_load(fit.mean) for one in structures)
+    return tuple(one.compute_load(fit.point) for one in structures)
 
 
 OTHER: dict[LossLaw, LossLaw] = {"paper": "dissipative", "dissipative": "paper"}

@@ -187,11 +187,9 @@ def _build_fit(
     problem, point, normal = found.problem, found.point, found.normal
     chi2 = (normal.cost - problem.prior.compute_prior_cost(point.values)) / problem.size
     own, added = fit.covariance - fit.noise_covariance, point.values.size - plant.index
-    values = point.values + np.append(fit.mean.values - fit.point.values, np.zeros(added))
     return LikelihoodFit(
         problem,
         point,
-        point.replace_values(np.clip(values, problem.lower, problem.upper)),
         compute_covariance(problem, normal, chi2) + np.pad(own, (0, added)),
         normal,
         chi2,

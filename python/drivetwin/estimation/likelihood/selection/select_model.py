@@ -289,7 +289,6 @@ def _drop_unknown(best: LikelihoodFit, narrower: DualClutchProblem, name: str) -
         best,
         problem=problem,
         point=point,
-        mean=_drop_value(best.mean, k),
         covariance=compute_covariance(problem, normal, best.chi2),
         normal=normal,
     )
