@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,7 @@ from drivetwin.fit.places import Place, find_input_quantity, get_output_quantity
 from drivetwin.fit.plant import NetworkTerm, Plant, Problem
 from drivetwin.fit.release import extend
 from drivetwin.fit.unknown import ASCII_UNITS
+from drivetwin.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
 from drivetwin.likelihood.column_products import adjust_unknowns, weigh_amounts
 from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
 from drivetwin.likelihood.point import ParameterVector
@@ -125,47 +127,65 @@ def complete_model(found: OptimizeResult[Problem], stated: Collection[str]) -> C
     stated
         Paths whose distribution is stated: nothing is left out there.
     """
-    stated_model, found = found, _extend_inputs(found)
+    found = _extend_inputs(found)
     candidates = _list_omissions(found, stated)
-    plays = _list_plays(found)
-    shown: list[ShownOmission] = []
-    apart: list[_Rival] = []
-    weighed = _weigh_all(found, candidates)
-    while len(shown) < OMISSIONS.most:
-        best = max(weighed, key=lambda one: one.nats, default=None)
-        played = [] if is_explained(found) else [_put_play(found, one) for one in plays]
-        plays = [one.omission for one in played if one.result is not None]
-        play = max(played, key=lambda one: one.nats, default=None)
-        rivals: list[_Rival] = []
-        if best is not None and best.weight >= 1.0 and (play is None or best.nats > play.nats):
-            candidates = [one for one in candidates if one is not best.omission]
-            nats, better = best.nats, _put_into_model(found, best)
-            rivals = _list_rivals(best, weighed)
-        elif play is not None and play.result is not None:
-            plays = [one for one in plays if one is not play.omission]
-            nats, better = play.nats, play.result
-        else:
-            break
-        if better is not None:
-            found = better
-            number = found.problem.terms[0].plant.fixed[-1]
-            names = [one.name for one in rivals if one.share > OMISSIONS.odds]
-            shown.append(ShownOmission(number, nats, tuple(names)))
-            apart += rivals
-        weighed = _weigh_all(found, candidates)
-    if shown and found.normal.cost > EXPLAINED * found.problem.size:
-        # What leaves a residual as it is explains nothing.
-        found, shown, apart = stated_model, [], []
-        weighed = _weigh_all(found, candidates)
-    total = 1.0 + sum(one.weight for one in weighed)
-    size = len(found.point.names)
+    begin = _Completion(found, candidates, _list_plays(found), _weigh_all(found, candidates))
+    done = begin
+    with suppress(BudgetExceeded), limit_evaluations(MAX_REFIT_WORK):
+        while len(done.shown) < OMISSIONS.most and (more := _admit_best(done)) is not None:
+            done = more
+    if done.shown and done.found.normal.cost > EXPLAINED * done.found.problem.size:
+        done = begin  # What leaves a residual as it is explains nothing.
+    total = 1.0 + sum(one.weight for one in done.weighed)
+    size = len(done.found.point.names)
     spread = np.zeros((size, size))
-    for one in weighed:
+    for one in done.weighed:
         spread += one.weight / total * one.power * np.outer(one.moves, one.moves)
-    for rival in apart:
+    for rival in done.apart:
         own = slice(rival.apart.size)
         spread[own, own] += rival.share * np.outer(rival.apart, rival.apart)
-    return CompletedFit(found, tuple(shown), spread)
+    return CompletedFit(done.found, done.shown, spread)
+
+
+@dataclass(frozen=True, eq=False)
+class _Completion:
+    """Minimum `found` with the omissions `shown`, and what it may lack beside them.
+
+    `weighed` are the evidences of `candidates` at this minimum, `apart` the rivals of those shown.
+    """
+
+    found: OptimizeResult[Problem]
+    candidates: Sequence[Omission]
+    plays: Sequence[Omission]
+    weighed: Sequence[_Weighed]
+    shown: tuple[ShownOmission, ...] = ()
+    apart: tuple[_Rival, ...] = ()
+
+
+def _admit_best(done: _Completion) -> _Completion | None:
+    """Minimise with the omission that has most evidence; None where none has enough."""
+    found, candidates = done.found, done.candidates
+    best = max(done.weighed, key=lambda one: one.nats, default=None)
+    played = [] if is_explained(found) else [_put_play(found, one) for one in done.plays]
+    plays = [one.omission for one in played if one.result is not None]
+    play = max(played, key=lambda one: one.nats, default=None)
+    rivals: list[_Rival] = []
+    if best is not None and best.weight >= 1.0 and (play is None or best.nats > play.nats):
+        candidates = [one for one in candidates if one is not best.omission]
+        nats, better = best.nats, _put_into_model(found, best)
+        rivals = _list_rivals(best, done.weighed)
+    elif play is not None and play.result is not None:
+        plays = [one for one in plays if one is not play.omission]
+        nats, better = play.nats, play.result
+    else:
+        return None
+    shown, apart = done.shown, done.apart
+    if better is not None:
+        found = better
+        names = tuple(one.name for one in rivals if one.share > OMISSIONS.odds)
+        shown += (ShownOmission(found.problem.terms[0].plant.fixed[-1], nats, names),)
+        apart += tuple(rivals)
+    return _Completion(found, candidates, plays, _weigh_all(found, candidates), shown, apart)
 
 
 def _extend_inputs(found: OptimizeResult[Problem]) -> OptimizeResult[Problem]:

@@ -104,11 +104,7 @@ def search(
             again = _seek(best.problem, start, spread, seed)
             if again.result.normal.cost < best.normal.cost:
                 found = _lower_estimates(again)
-        is_far = _is_far(found.result.normal.cost, problem.size)
-        work = MAX_REFIT_WORK if is_far else np.inf
-        with suppress(BudgetExceeded), limit_evaluations(work):
-            return _complete(found, fixed, len(sought), stated)
-        return found
+        return _complete(found, fixed, len(sought), stated)
 
 
 def _seek(problem: Problem, start: ParameterVector, spread: FloatArray, seed: int) -> FoundMinimum:
@@ -134,8 +130,12 @@ def _complete(
     found: FoundMinimum, fixed: Sequence[FixedNumber], count: int, stated: Collection[str]
 ) -> FoundMinimum:
     """Minimise over the fixed numbers and the omissions as well, from the minimum over `count`
-    unknowns of the network."""
-    best, moved = release_fixed(found.result, fixed, count)
+    unknowns of the network; that minimum where the work of a refit does not suffice."""
+    try:
+        with limit_evaluations(MAX_REFIT_WORK):
+            best, moved = release_fixed(found.result, fixed, count)
+    except BudgetExceeded:
+        return replace(found, is_limited=True)
     complete = complete_model(best, stated)
     best, shown = complete.result, complete.shown
     size = best.problem.size

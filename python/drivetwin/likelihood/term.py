@@ -239,9 +239,13 @@ class RecordedTerm(Generic[P, R]):
             return None
         simulated = self.record.sample(self.show(point, run.columns))
         residual = self.record.measured - simulated - self.returned
+        return residual if self._can_square(residual) else None
+
+    def _can_square(self, values: FloatArray) -> bool:
+        """Return whether samples (n,) are finite and their squares over the noise do not overflow
+        the sum of the others."""
         with np.errstate(invalid="ignore"):
-            is_small = np.abs(residual) < OBJECTIVE.max_residual * self.record.sigma
-        return residual if bool(np.all(is_small)) else None
+            return bool(np.all(np.abs(values) < OBJECTIVE.max_residual * self.record.sigma))
 
     def update_weighting(self, point: ParameterVector) -> Self:
         """Compute the covariance of output and input noise at `point`.
@@ -277,6 +281,8 @@ class RecordedTerm(Generic[P, R]):
         quiet = compute_quiet_noise(response, seen) if self.quiet is None else self.quiet
         held_back = record.interpolate_held_back(delays)
         returned = self._return_inputs(point, response, held_back)
+        if not self._can_square(returned):  # a linear response that grows without limit
+            return None
         shared = record.compute_shared_noise()
         if shared is not None:
             slope = np.asarray(shared.share.sum(axis=1), dtype=np.float64)
