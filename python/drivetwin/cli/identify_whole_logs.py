@@ -25,7 +25,7 @@ from drivetwin.report.bus import build_tcu_blocks, build_tcu_page, identify_vehi
 from drivetwin.report.html import save_page
 from drivetwin.tcu.card import load_controller_card
 from drivetwin.tcu.outcome import TcuIdentification, identify_controller
-from drivetwin.twin.build import build_shift_twin
+from drivetwin.twin.build_controlled import build_shift_twin
 from drivetwin.vehicle.card import load_ratio_card
 
 
