@@ -155,13 +155,14 @@ def test_derivatives_are_those_of_the_run(made: Path) -> None:
     card = load_controller_card(made / "card.toml")
     shift = read_controller_log(made / "log.csv", card).shifts[1]
     term, _ = build_term(card, shift)
-    point = ParameterVector(term.names, np.array([one.start for one in term.plant.sought]))
+    names = tuple(one.name for one in term.plant.sought)
+    point = ParameterVector(names, np.array([one.start for one in term.plant.sought]))
     found = term.linearise(point)
     assert found is not None
     residual, slopes = found
     assert residual == pytest.approx(term.evaluate(point), abs=1e-6)
     for k, one in enumerate(term.plant.sought):
-        step = np.zeros(len(term.names))
+        step = np.zeros(len(names))
         step[k] = 0.02 * (one.spread or 1.0)
         ends = [term.evaluate(point.replace_values(point.values + side)) for side in (step, -step)]
         assert ends[0] is not None

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -28,6 +28,17 @@ from drivetwin.simulation.network import Element, Output, Sine, Start, make_inpu
 from drivetwin.simulation.network_sensitivity import NetworkTask
 from drivetwin.simulation.variable import Variable, list_variables
 
+_TABLES = ("elements", "speeds", "twists", "levels", "inputs", "outputs")
+
+
+class InputPath(NamedTuple):
+    """Input as a function of the unknowns `of`: `compute` of their values returns it (N,) over the
+    grid `time` (N,) [s]."""
+
+    time: FloatArray
+    of: Sequence[str]
+    compute: Callable[..., FloatArray]
+
 
 @dataclass(frozen=True, eq=False)
 class Plant(RecordedPlant[RecordedData]):
@@ -38,7 +49,10 @@ class Plant(RecordedPlant[RecordedData]):
     the unknowns `sought` set. `own` are the unknowns of the start of this recording by node or
     shaft, `fixed` the numbers beside the unknowns that may move. `label` precedes the start in the
     vector of the unknowns: `log1.start.engine`; empty where there is one recording. `usual_rate`
-    [1/s] is that of a run of usual length, see `limit_rate`.
+    [1/s] is that of a run of usual length, see `limit_rate`. `paths` are the inputs that are
+    functions of unknowns. The outputs `means` are means over twice their delay. `steps` are those
+    of coordinates for differences; a step below the deviation of a coordinate counts kinks of an
+    input as information.
     """
 
     elements: Sequence[Element]
@@ -55,6 +69,9 @@ class Plant(RecordedPlant[RecordedData]):
     fixed: Sequence[FixedNumber] = ()
     usual_rate: float = np.inf
     accuracy: Accuracy = field(default_factory=Accuracy)
+    paths: Mapping[str, InputPath] = field(default_factory=dict)
+    means: Collection[str] = ()
+    steps: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def _settings(self) -> list[tuple[Setting, Place]]:
@@ -98,8 +115,43 @@ class Plant(RecordedPlant[RecordedData]):
         plain = (name for name, place in self._acting if not place.schema.differentiable)
         return list(dict.fromkeys(plain))
 
+    def list_of_channels(self) -> list[str]:
+        """List those of them that act on the channels of outputs alone, not on the run."""
+        tables: dict[str, set[object]] = {}
+        for name, place in self._acting:
+            tables.setdefault(name, set()).add(place.keys[0])
+        return [name for name, own in tables.items() if own == {"outputs"}]
+
+    def drive(self, name: str, point: ParameterVector) -> Signal:
+        """Compute the input of a path at `point`."""
+        path = self.paths[name]
+        values = (self._by_name[one].to_value(float(point[one])) for one in path.of)
+        return Signal(path.time, path.compute(*values))
+
+    def list_disturbances(
+        self, point: ParameterVector, record: RecordedData
+    ) -> dict[str, dict[str, FloatArray]]:
+        """List the changes of the inputs of paths by coordinates, as central differences."""
+        found: dict[str, dict[str, FloatArray]] = {}
+        for name, path in self.paths.items():
+            for one in path.of:
+                ends, step = [], self.get_step(one)
+                for side in (step, -step):
+                    values = point.values.copy()
+                    values[point.names.index(one)] += side
+                    ends.append(self.drive(name, point.replace_values(values)).values)
+                change = np.interp(record.time, path.time, (ends[0] - ends[1]) / (2.0 * step))
+                found.setdefault(one, {})[name] = 0.5 * (change[1:] + change[:-1])
+        return found
+
+    @cached_property
+    def _by_name(self) -> dict[str, SoughtNumber]:
+        return {one.name: one for one in self.sought}
+
     def get_step(self, name: str) -> float:
         """Return the step of a coordinate for a difference of runs."""
+        if name in self.steps:
+            return self.steps[name]
         sizes = [
             (self.sizes.get(str(place.keys[1])) or 1.0) ** _POWERS[place.field]
             for one, place in self._acting
@@ -118,7 +170,8 @@ class Plant(RecordedPlant[RecordedData]):
 
         Numbers carry their derivatives where those of the point do.
         """
-        every: dict[str, Signal | Sine] = {**self.inputs, **inputs}
+        driven = {name: self.drive(name, point) for name in self.paths}
+        every: dict[str, Signal | Sine] = {**self.inputs, **driven, **inputs}
         tables = self.compute_tables(point, every)
         for name, numbers in tables["inputs"].items():
             signal = every[name]
@@ -149,7 +202,7 @@ class Plant(RecordedPlant[RecordedData]):
 
     def get_delays(self, point: ParameterVector, inputs: Mapping[str, Signal]) -> dict[str, float]:
         """Return the delay [s] of each of `inputs` at `point`."""
-        moved = self.compute_tables(point, inputs)["inputs"]
+        moved = self.compute_tables(point, inputs, ("inputs",))["inputs"]
         return {
             name: float(moved[name]["delay"] if name in moved else one.delay)
             for name, one in inputs.items()
@@ -157,21 +210,27 @@ class Plant(RecordedPlant[RecordedData]):
 
     def build_channels(self, point: ParameterVector) -> dict[str, Channel]:
         """Build the channels of the compared outputs at `point`, by name."""
-        moved = self.compute_tables(point)["outputs"] if self._channels["outputs"] else {}
-        return {name: Channel(**moved.get(name, CHANNEL)) for name in self.outputs}
+        moved = self.compute_tables(point, tables=("outputs",))["outputs"]
+        return {
+            name: Channel(**moved.get(name, CHANNEL), is_mean=name in self.means)
+            for name in self.outputs
+        }
 
     def get_gains(self, point: ParameterVector) -> dict[str, float]:
         """Return the gain of each measured input whose channel moves."""
-        moved = self.compute_tables(point)["inputs"]
+        moved = self.compute_tables(point, tables=("inputs",))["inputs"]
         return {name: float(numbers["gain"]) for name, numbers in moved.items()}
 
     def compute_tables(
-        self, point: ParameterVector, inputs: Mapping[str, Signal | Sine] | None = None
+        self,
+        point: ParameterVector,
+        inputs: Mapping[str, Signal | Sine] | None = None,
+        tables: Collection[str] = _TABLES,
     ) -> dict[str, Any]:
         """Compute the numbers of a run at `point`: `elements`, `speeds` and `twists` of the start,
         `levels` of constant inputs, and of the `inputs` and `outputs` whose channels move.
 
-        Those of `inputs` begin with their delay.
+        Those of `inputs` begin with their delay. Only the numbers of `tables` are set.
         """
         given = inputs or {}
         channels = {
@@ -191,13 +250,15 @@ class Plant(RecordedPlant[RecordedData]):
         for name in self.own:
             table = "speeds" if name in self.start.speeds else "twists"
             numbers.put((table, name), point[self.get_start_name(name)])
-        values = {one.name: one.to_value(point[one.name]) for one in self.sought}
-        for setting, place in self._settings:
+        settings = [each for each in self._settings if each[1].keys[0] in tables]
+        acting = {name for setting, _ in settings for name in setting.of}
+        values = {name: self._by_name[name].to_value(point[name]) for name in acting}
+        for setting, place in settings:
             numbers.put(place.keys, setting.compute(*(values[name] for name in setting.of)))
         for fixed in self.fixed:
-            x = point[fixed.coordinate]
             for keys in fixed.places:
-                numbers.put(keys, fixed.move(numbers.get(keys), x))
+                if keys[0] in tables:
+                    numbers.put(keys, fixed.move(numbers.get(keys), point[fixed.coordinate]))
         return numbers.tables
 
 

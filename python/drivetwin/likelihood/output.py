@@ -90,26 +90,38 @@ class Output:
         """
         if self.window == 0.0:
             return column[self.place]
-        return self._compute_means(time, column, self.window)
+        return _compute_means(time, column, self.place, self.window)
 
     def sample_other_mode(self, time: FloatArray, column: FloatArray) -> FloatArray:
         """Sample a quantity in the other mode (n,): means instead of point samples, or the
         reverse."""
         if self.window > 0.0:
             return column[self.place]
-        return self._compute_means(time, column, self.get_period(time))
+        return _compute_means(time, column, self.place, self.get_period(time))
 
-    def _compute_means(self, time: FloatArray, column: FloatArray, window: float) -> FloatArray:
-        """Compute means (n,) over the `window` [s] before each stamp."""
-        step = np.diff(time).reshape(-1, *[1] * (column.ndim - 1))
-        sums = np.cumsum(0.5 * (column[1:] + column[:-1]) * step, axis=0)
-        total = np.concatenate([np.zeros_like(column[:1]), sums])
-        begin = time[self.place] - window
-        after = np.clip(np.searchsorted(time, begin), 1, time.size - 1)
-        share = np.clip((begin - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
-        share = share.reshape(-1, *[1] * (column.ndim - 1))
-        before = total[after - 1] + share * (total[after] - total[after - 1])
-        return np.asarray((total[self.place] - before) / window)
+
+def _compute_means(
+    time: FloatArray, columns: FloatArray, place: IndexArray | slice, window: float
+) -> FloatArray:
+    """Compute means (n, ...) of quantities (N, ...) over the `window` [s] before the points `place`
+    of the grid `time` (N,); before the grid they are constant."""
+    shape = (-1, *[1] * (columns.ndim - 1))
+    step = np.diff(time).reshape(shape)
+    sums = np.cumsum(0.5 * (columns[1:] + columns[:-1]) * step, axis=0)
+    total = np.concatenate([np.zeros_like(columns[:1]), sums])
+    begin = time[place] - window
+    first = np.clip(np.searchsorted(time, begin) - 1, 0, time.size - 1)
+    ends = columns[first] + _interpolate(time, columns, begin)
+    before = total[first] + 0.5 * (begin - time[first]).reshape(shape) * ends
+    return np.asarray((total[place] - before) / window)
+
+
+def _interpolate(time: FloatArray, columns: FloatArray, at: FloatArray) -> FloatArray:
+    """Interpolate quantities (N, ...) over the grid `time` (N,) at instants; constant beyond."""
+    after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
+    share = np.clip((at - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+    share = share.reshape(-1, *[1] * (columns.ndim - 1))
+    return np.asarray((1.0 - share) * columns[after - 1] + share * columns[after])
 
 
 class ComparedOutputs:
@@ -141,22 +153,21 @@ class ComparedOutputs:
 @dataclass(frozen=True)
 class Channel:
     """Measured quantity of a quantity x: `gain` · x + `curve` · x·|x| + `offset`, with x at
-    t - `delay`."""
+    t - `delay`; where it `is_mean`, with the mean of x over twice the delay before t."""
 
     gain: float = 1.0
     offset: float = 0.0
     delay: float = 0.0
     curve: float = 0.0
+    is_mean: bool = False
 
     def delay_columns(self, time: FloatArray, columns: FloatArray) -> FloatArray:
-        """Interpolate quantities (N, ...) at the instants `time` (N,) [s] less the delay."""
+        """Delay quantities (N, ...) over the grid `time` (N,) [s]."""
         if self.delay == 0.0:
             return columns
-        at = time - self.delay
-        after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
-        share = np.clip((at - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
-        share = share.reshape(-1, *[1] * (columns.ndim - 1))
-        return np.asarray((1.0 - share) * columns[after - 1] + share * columns[after])
+        if self.is_mean and self.delay > 0.0:
+            return _compute_means(time, columns, slice(None), 2.0 * self.delay)
+        return _interpolate(time, columns, time - self.delay)
 
     def show(self, time: FloatArray, column: FloatArray) -> FloatArray:
         """Compute the measured quantity (N, ...) of a quantity over `time` (N,) [s]."""

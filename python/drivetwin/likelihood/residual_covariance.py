@@ -65,10 +65,14 @@ class LinearResponse:
         """
         if not self.finite:
             return np.full((len(self.transition) + 1, self.states), np.nan)
+        return self.propagate(self.sum_pushes(disturbance))
+
+    def sum_pushes(self, disturbance: Mapping[str, FloatArray]) -> FloatArray:
+        """Compute the changes (N-1, S) of the states by disturbances (N-1,) of inputs by name."""
         push = np.zeros(self.transition.shape[:2])
         for name, values in disturbance.items():
             push += self.drive[name] * values[:, None]
-        return self.propagate(push)
+        return push
 
     def propagate(self, push: FloatArray) -> FloatArray:
         """Compute z (N, S) for changes `push` (N-1, S) over the steps, from z = 0."""

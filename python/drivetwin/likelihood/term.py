@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from itertools import chain
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
 from drivetwin.likelihood.objective import OBJECTIVE
 from drivetwin.likelihood.output import Channel, Output, SignalFit, compute_fit
-from drivetwin.likelihood.point import ParameterVector
+from drivetwin.likelihood.point import ParameterVector, find_acting, place_columns
 from drivetwin.likelihood.recorded_data import RecordedData
 from drivetwin.likelihood.residual_covariance import (
     InputNoise,
@@ -32,13 +33,6 @@ from drivetwin.simulation.network_response import compute_response
 from drivetwin.simulation.network_sensitivity import NetworkSensitivities, NetworkTask
 
 R = TypeVar("R", bound=RecordedData)
-
-
-class Disturbance(NamedTuple):
-    """Change (N-1,) of an `input` over each step of the grid per unit of a coordinate."""
-
-    input: str
-    change: FloatArray
 
 
 class RecordedPlant(ABC, Generic[R]):
@@ -79,8 +73,15 @@ class RecordedPlant(ABC, Generic[R]):
         """List the coordinates that act on numbers by which the core has no derivatives."""
         return []
 
-    def list_disturbances(self, point: ParameterVector, record: R) -> dict[str, Disturbance]:
-        """List the coordinates at `point` that act as a disturbance of an input, by name."""
+    def list_of_channels(self) -> list[str]:
+        """List those of them that act on the channels of outputs alone, not on the run."""
+        return []
+
+    def list_disturbances(
+        self, point: ParameterVector, record: R
+    ) -> dict[str, dict[str, FloatArray]]:
+        """List the changes (N-1,) of inputs over each step of the grid per unit of a coordinate at
+        `point`, by the names of coordinate and input."""
         del point, record
         return {}
 
@@ -182,17 +183,19 @@ class RecordedTerm(Generic[P, R]):
             for name, one in self.plant.build_channels(point).items()
         }
 
-    def _show_derivatives(
+    def _sample_derivatives(
         self, point: ParameterVector, found: NetworkSensitivities
-    ) -> dict[str, FloatArray]:
-        """Compute the derivatives (N, p) of the compared outputs as their channels show them."""
-        return {
+    ) -> FloatArray:
+        """Sample the derivatives (n, p) of the compared outputs as their channels show them."""
+        acting = find_acting(np.vstack([*found.derivatives.values()]))
+        shown = {
             name: channel.show_changes(
-                self.record.time, found.derivatives[one], found.run.columns[one]
+                self.record.time, found.derivatives[one][:, acting], found.run.columns[one]
             )
             for name, channel in self.plant.build_channels(point).items()
             for one in [self.plant.outputs[name]]
         }
+        return place_columns(self.record.sample(shown), acting, len(point.names))
 
     def linearise(self, point: ParameterVector) -> tuple[FloatArray, FloatArray] | None:
         """Compute the residual (n,) and the derivative (n, p) of the simulated samples by
@@ -206,28 +209,43 @@ class RecordedTerm(Generic[P, R]):
         residual = self._compute_residual(point, found.run)
         if residual is None:
             return None
-        slopes = self.record.sample(self._show_derivatives(point, found))
+        slopes = self._sample_derivatives(point, found)
         for name in apart:
-            column = self._compute_slope(point, name, residual)
+            column = self._compute_slope(point, name, residual, found.run)
             if column is None:
                 return None
             slopes[:, point.names.index(name)] = column
         disturbances = self.plant.list_disturbances(point, self.record)
-        response = self.compute_response(point) if disturbances else None
-        for name, one in disturbances.items():
-            slopes[:, point.names.index(name)] = self.observe(response, {one.input: one.change})
+        if disturbances:
+            response = self.compute_response(point, driven={*chain(*disturbances.values())})
+            if response is None:
+                return None
+            push = [response.sum_pushes(one) for one in disturbances.values()]
+            shown = response.show(response.propagate_columns(np.stack(push, axis=2)))
+            places = [point.names.index(name) for name in disturbances]
+            slopes[:, places] += self._sample_late(point, shown)
         return (residual, slopes) if np.all(np.isfinite(slopes)) else None
 
+    def _sample_late(self, point: ParameterVector, columns: Mapping[str, FloatArray]) -> FloatArray:
+        """Sample changes (N, ...) of the compared outputs, late as their channels show them."""
+        channels, time = self.plant.build_channels(point), self.record.time
+        return self.record.sample(
+            {name: channels[name].delay_columns(time, one) for name, one in columns.items()}
+        )
+
     def _compute_slope(
-        self, point: ParameterVector, name: str, residual: FloatArray
+        self, point: ParameterVector, name: str, residual: FloatArray, run: NetworkRun
     ) -> FloatArray | None:
         """Compute the derivative (n,) of the samples by a coordinate as the difference of two runs;
-        None if no step away from `point`, which leaves the `residual` (n,), can be simulated."""
+        None if no step away from `point`, whose `run` leaves the `residual` (n,), can be
+        simulated."""
         place, step = point.names.index(name), self.plant.get_step(name)
+        is_same = name in self.plant.list_of_channels()
         for side in (step, -step):
             values = point.values.copy()
             values[place] += side
-            there = self.evaluate(point.replace_values(values))
+            near = point.replace_values(values)
+            there = self._compute_residual(near, run) if is_same else self.evaluate(near)
             if there is not None:
                 return np.asarray((residual - there) / side)
         return None
@@ -295,10 +313,11 @@ class RecordedTerm(Generic[P, R]):
         return replace(self, weighting=weighting, returned=returned, quiet=quiet)
 
     def compute_response(
-        self, point: ParameterVector, nodes: Sequence[str] = ()
+        self, point: ParameterVector, nodes: Sequence[str] = (), driven: Collection[str] = ()
     ) -> LinearResponse | None:
-        """Compute the linear response of the outputs at `point` to disturbances of the inputs, and
-        to torques on `nodes`; None if the run fails or has no finite response."""
+        """Compute the linear response of the outputs at `point` to disturbances of the inputs, of
+        those that are `driven` by unknowns, and to torques on `nodes`; None if the run fails or has
+        no finite response."""
         task = self.build_task(point)
         pushes = [build_element("torque", f"push {one}", node=one, input=one) for one in nodes]
         still = Signal(task.time[[0, -1]], np.zeros(2))
@@ -306,7 +325,12 @@ class RecordedTerm(Generic[P, R]):
         outputs = list(dict.fromkeys(task.outputs))
         try:
             found = compute_response(
-                [*task.elements, *pushes], inputs, task.start, task.time, outputs
+                [*task.elements, *pushes],
+                inputs,
+                task.start,
+                task.time,
+                outputs,
+                accuracy=task.accuracy,
             )
         except InputError:
             return None
@@ -316,7 +340,8 @@ class RecordedTerm(Generic[P, R]):
             found.scale_inputs(self.plant.get_gains(point)),
             self.plant.build_channels(point),
         )
-        drive = {n: found.drive[n] for n in (*self.record.inputs, *nodes) if n in found.drive}
+        names = (*self.record.inputs, *driven, *nodes)
+        drive = {name: found.drive[name] for name in names if name in found.drive}
         rows = {n: channels[n].gain * found.rows[one] for n, one in self.plant.outputs.items()}
         offset = {name: one for name, one in found.offset.items() if name in drive}
         response = LinearResponse(found.transition, drive, rows, offset)
@@ -350,12 +375,10 @@ class RecordedTerm(Generic[P, R]):
     ) -> FloatArray:
         """Compute the change (n,) of the samples by changes (N,) of the inputs at the points of the
         grid, by name."""
-        channels = self.plant.build_channels(point)
         steps = {name: 0.5 * (changes[name][1:] + changes[name][:-1]) for name in response.drive}
         shown = response.show(response.propagate_inputs(steps))
         columns = {}
         for name, column in shown.items():
             direct = response.compute_direct(response.rows[name])
-            whole = column + sum(own * changes[of] for of, own in direct.items())
-            columns[name] = channels[name].delay_columns(self.record.time, whole)
-        return self.record.sample(columns)
+            columns[name] = column + sum(own * changes[of] for of, own in direct.items())
+        return self._sample_late(point, columns)

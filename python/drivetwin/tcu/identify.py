@@ -10,7 +10,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
-from drivetwin.fit.driven_term import DrivenProblem
+from drivetwin.fit.plant import Problem
 from drivetwin.likelihood.gauss_newton import GaussNewtonSettings, OptimizeResult, minimise
 from drivetwin.likelihood.point import ParameterVector
 from drivetwin.tcu.card import ControllerCard
@@ -62,7 +62,7 @@ class FittedShifts:
 
     card: ControllerCard
     shifts: tuple[ControllerShift, ...]
-    problem: DrivenProblem
+    problem: Problem
     coordinates: Coordinates
     point: ParameterVector
     covariance: FloatArray
@@ -95,7 +95,7 @@ def fit_shifts(card: ControllerCard, shifts: Sequence[ControllerShift]) -> Fitte
     problem, point, coordinates = build_problem(card, shifts)
     first = {one.kind: k for k, one in reversed(list(enumerate(shifts)))}
     for some in ([problem.terms[k] for k in first.values()], problem.terms):
-        problem = weigh(replace(problem, terms=tuple(some)), LOOSE, point)
+        problem = weigh(replace(problem, terms=tuple(some)), LOOSE.shared, point)
         found = _require(minimise(problem, point, rough=True, settings=_LOOSE))
         point = found.point
     for turn in range(_ROUNDS):
@@ -103,7 +103,7 @@ def fit_shifts(card: ControllerCard, shifts: Sequence[ControllerShift]) -> Fitte
         noise = estimate_noise(found.problem, point)
         covariance = _invert(found)
         spread = np.sqrt(np.diag(covariance))
-        problem = _widen_steps(weigh(found.problem, noise, point), coordinates, spread)
+        problem = _widen_steps(weigh(found.problem, noise.shared, point), coordinates, spread)
         sizes = estimate_sizes(coordinates, point, covariance) if turn else {}
         problem = replace(problem, prior=coordinates.resize(sizes).prior)
         found = _require(minimise(problem, point, settings=_TIGHT))
@@ -112,12 +112,12 @@ def fit_shifts(card: ControllerCard, shifts: Sequence[ControllerShift]) -> Fitte
     )
 
 
-def _invert(found: OptimizeResult[DrivenProblem]) -> FloatArray:
+def _invert(found: OptimizeResult[Problem]) -> FloatArray:
     """Return the covariance (p, p) at a minimum."""
     return np.asarray(np.linalg.inv(found.normal.information), dtype=np.float64)
 
 
-def _require(found: OptimizeResult[DrivenProblem] | None) -> OptimizeResult[DrivenProblem]:
+def _require(found: OptimizeResult[Problem] | None) -> OptimizeResult[Problem]:
     if found is None:
         raise IdentificationError(
             "the simulation of the shifts fails at the numbers of the card",
@@ -126,9 +126,7 @@ def _require(found: OptimizeResult[DrivenProblem] | None) -> OptimizeResult[Driv
     return found
 
 
-def _widen_steps(
-    problem: DrivenProblem, coordinates: Coordinates, spread: FloatArray
-) -> DrivenProblem:
+def _widen_steps(problem: Problem, coordinates: Coordinates, spread: FloatArray) -> Problem:
     """Take differences over a share of the posterior deviation: below it, an expansion counts kinks
     of the actuators as information."""
     steps = dict(
@@ -138,7 +136,5 @@ def _widen_steps(
             strict=True,
         )
     )
-    terms = tuple(
-        replace(term, steps={name: steps[name] for name in term.names}) for term in problem.terms
-    )
+    terms = tuple(replace(one, plant=replace(one.plant, steps=steps)) for one in problem.terms)
     return replace(problem, terms=terms)

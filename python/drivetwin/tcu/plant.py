@@ -12,13 +12,12 @@ from scipy.constants import bar
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, HeldSignal
-from drivetwin.fit.driven_term import DrivenTerm, InputPath, Rows
 from drivetwin.fit.expression import Expression, resolve_numbers
 from drivetwin.fit.places import list_places
-from drivetwin.fit.plant import Plant
+from drivetwin.fit.plant import InputPath, NetworkTerm, Plant
 from drivetwin.fit.unknown import Unknown
 from drivetwin.likelihood.output import Output as ComparedOutput
-from drivetwin.likelihood.residual_covariance import build_sensor_whitener
+from drivetwin.likelihood.recorded_data import RecordedData, fill_grid
 from drivetwin.simulation.dual_clutch import Accuracy
 from drivetwin.simulation.network import Element, Output, Start, build_element
 from drivetwin.simulation.variable import exp
@@ -115,15 +114,14 @@ class ShiftPlant:
 
     def drive(self, name: str, compute: Callable[..., FloatArray], *of: str) -> None:
         """Compute an input from unknowns."""
-        self.paths[name] = InputPath(of, compute)
+        self.paths[name] = InputPath(self.grid, of, compute)
 
 
 def build_term(
     card: ControllerCard, shift: ControllerShift
-) -> tuple[DrivenTerm, dict[str, Stated]]:
+) -> tuple[NetworkTerm, dict[str, Stated]]:
     """Build the term of a shift, and the numbers that act on it by name."""
-    grid = np.arange(0.0, shift.time[-1] + GRID, GRID)
-    plant = ShiftPlant(card, shift, grid)
+    plant = ShiftPlant(card, shift, fill_grid(shift.time, GRID))
     for name, one in list_common(card).items():
         plant.seek(name, one, _PATHS.get(name))
     _add_engine(plant)
@@ -154,8 +152,9 @@ def _add_engine(plant: ShiftPlant) -> None:
         by_speed: float,
         error: float,
     ) -> FloatArray:
-        read = np.interp(grid + delay, shift.time, shift.torque)
-        late = lag_signal(grid, read, max(lag, GRID))
+        even = np.arange(0.0, grid[-1] + GRID, GRID)
+        read = np.interp(even + delay, shift.time, shift.torque)
+        late = np.interp(grid, even, lag_signal(even, read, max(lag, GRID)))
         bent = 1.0 + by_torque * (late / _REFERENCE_TORQUE - 1.0) + by_speed * speed
         return np.asarray(scale * late * bent + offset + error)
 
@@ -392,7 +391,7 @@ def _add_start(plant: ShiftPlant) -> Start:
     return Start(starts, {"shaft": twist}, locked)
 
 
-def _assemble(plant: ShiftPlant, start: Start) -> DrivenTerm:
+def _assemble(plant: ShiftPlant, start: Start) -> NetworkTerm:
     """Resolve the unknowns against the network, and compare its speeds with the rows."""
     shift = plant.shift
     places = list_places(plant.elements, start, (), {}, OUTPUTS)
@@ -405,18 +404,19 @@ def _assemble(plant: ShiftPlant, start: Start) -> DrivenTerm:
         numbers.sought,
         numbers.settings,
         places,
+        label=shift.name,
         accuracy=Accuracy(tolerance=_TOLERANCE),
+        paths=plant.paths,
+        means=_MEANS,
+        steps={one.name: 0.05 * (one.spread or 1.0) for one in numbers.sought},
     )
     place = np.searchsorted(plant.grid, shift.time)
     outputs = tuple(
         ComparedOutput(role, place, np.ascontiguousarray(shift.speeds[:, k]), 1.0)
         for k, role in enumerate(SPEEDS)
     )
-    record = Rows(plant.grid, shift.time, outputs, _MEANS)
-    steps = {one.name: 0.05 * (one.spread or 1.0) for one in numbers.sought}
-    delays = {role: f"delay_{role}" for role in SPEEDS}
-    weighting = build_sensor_whitener(np.ones(record.size))
-    return DrivenTerm(network, record, plant.paths, delays, steps, weighting, shift.name)
+    record = RecordedData(plant.grid, outputs, {}, {}, {}, {}, {})
+    return NetworkTerm.from_sensor_noise(network, record)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,13 +11,14 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.units import RPM
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.result.estimate import Z95
-from drivetwin.fit.driven_term import DrivenProblem
+from drivetwin.fit.plant import Problem
 from drivetwin.likelihood.gauss_newton import GaussNewtonSettings, minimise
 from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.identify import TcuTwin
 from drivetwin.tcu.log import SPEEDS, ControllerShift
-from drivetwin.tcu.problem import build_problem
+from drivetwin.tcu.plant import OUTPUTS
+from drivetwin.tcu.problem import build_problem, weigh
 
 DRAWS = 60
 """Draws of the numbers from which a band is formed [count]."""
@@ -120,7 +121,7 @@ def _add_own(covariance: FloatArray, information: FloatArray, places: list[int])
 
 
 def _join_covariance(
-    twin: TcuTwin, problem: DrivenProblem, places: list[int], fitted: list[int]
+    twin: TcuTwin, problem: Problem, places: list[int], fitted: list[int]
 ) -> FloatArray:
     """Return the covariance (p, p) of the numbers of a prediction: of the fit, and of the priors
     where a number took no part in it."""
@@ -131,8 +132,8 @@ def _join_covariance(
 
 
 def _hold(
-    problem: DrivenProblem, point: ParameterVector, covariance: FloatArray, places: list[int]
-) -> tuple[DrivenProblem, ParameterVector]:
+    problem: Problem, point: ParameterVector, covariance: FloatArray, places: list[int]
+) -> tuple[Problem, ParameterVector]:
     """Hold the numbers of the fit at their values."""
     mean, precision = problem.prior.mean.copy(), problem.prior.precision.copy()
     mean[places] = point.values[places]
@@ -142,17 +143,16 @@ def _hold(
     return replace(problem, prior=Prior(mean, precision)), point
 
 
-def _cut(problem: DrivenProblem, shift: ControllerShift, twin: TcuTwin) -> DrivenProblem:
+def _cut(problem: Problem, shift: ControllerShift, twin: TcuTwin) -> Problem:
     """Compare the rows before the change of the commanded gear alone."""
     (term,) = problem.terms
-    own = replace(term, record=term.record.cut(shift.change), memory={})
-    term = own.weigh(twin.noise.own)
-    return replace(problem, terms=(term,))
+    own = replace(term, record=term.record.cut(shift.change))
+    return weigh(replace(problem, terms=(own,)), twin.noise.own)
 
 
 def _draw(
     twin: TcuTwin,
-    problem: DrivenProblem,
+    problem: Problem,
     point: ParameterVector,
     covariance: FloatArray,
     shift: ControllerShift,
@@ -200,18 +200,17 @@ def _find_reach(drawn: FloatArray, about: FloatArray | float) -> FloatArray:
 
 
 def _simulate(
-    problem: DrivenProblem, point: ParameterVector, card: ControllerCard, shift: ControllerShift
+    problem: Problem, point: ParameterVector, card: ControllerCard, shift: ControllerShift
 ) -> tuple[FloatArray, SlipTimes]:
     """Simulate the rows (n, 3) of a shift and its times of slip."""
     (term,) = problem.terms
-    run = term.simulate(point)
+    run = term.build_task(point).simulate()
     if run.status != "completed":
         raise IdentificationError(
             f"the simulation of {shift.name} ends early", "check the log at that time"
         )
-    columns = {name: run.columns[one] for name, one in term.plant.outputs.items()}
-    rows = term.sample(point, columns).reshape(len(SPEEDS), -1).T
-    turbine, output = columns["input_speed"], columns["output_speed"]
+    rows = term.record.sample(term.show(point, run.columns)).reshape(len(SPEEDS), -1).T
+    turbine, output = (run.columns[OUTPUTS[name]] for name in SPEEDS[1:])
     return rows, find_slip(card, shift, term.record.time, turbine, output)
 
 

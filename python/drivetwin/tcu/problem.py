@@ -10,10 +10,11 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.units import RPM
-from drivetwin.fit.driven_term import DrivenProblem
+from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.likelihood.measured_signal import count_repeats
 from drivetwin.likelihood.point import ParameterVector, Prior
+from drivetwin.likelihood.residual_covariance import build_sensor_whitener
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.log import SPEEDS, ControllerShift
 from drivetwin.tcu.plant import build_term
@@ -77,7 +78,7 @@ def build_problem(
     card: ControllerCard,
     shifts: Sequence[ControllerShift],
     sizes: Mapping[Own, float] | None = None,
-) -> tuple[DrivenProblem, ParameterVector, Coordinates]:
+) -> tuple[Problem, ParameterVector, Coordinates]:
     """Build the likelihood of shifts, its first point and its coordinates.
 
     `sizes` are factors of the stated deviations of numbers of a shift.
@@ -102,7 +103,7 @@ def build_problem(
     coordinates = coordinates.resize(sizes or {})
     limits = [(-np.inf, np.inf) if one is None else one.limits for one in sought]
     lower, upper = np.array(limits).T
-    problem = DrivenProblem(tuple(terms), coordinates.prior, lower, upper, _REACH * spread)
+    problem = Problem(tuple(terms), coordinates.prior, lower, upper, _REACH * spread)
     return problem, ParameterVector(names, mean.copy()), coordinates
 
 
@@ -137,13 +138,33 @@ FLOOR, _FLOOR_REPEATS = 3.0 * RPM, 10.0
 the sensors' noise show no error of a law that other numbers have taken up."""
 
 
-def weigh(problem: DrivenProblem, noise: RowNoise, point: ParameterVector) -> DrivenProblem:
-    """Weigh the rows of all shifts by the noise; about a point, those far off weigh less."""
-    terms = tuple(one.weigh(noise.shared, point) for one in problem.terms)
+_FAR = 3.0
+"""Residual from which a row weighs less (Huber 1964) [standard deviations]."""
+
+
+def weigh(
+    problem: Problem, sigma: Mapping[str, float], point: ParameterVector | None = None
+) -> Problem:
+    """Weigh the rows by the noise `sigma` of each output.
+
+    About a `point`, rows beyond 3 deviations weigh less, so that their influence is bounded.
+    """
+    terms = tuple(_weigh_rows(one, sigma, point) for one in problem.terms)
     return replace(problem, terms=terms)
 
 
-def estimate_noise(problem: DrivenProblem, point: ParameterVector) -> RowNoise:
+def _weigh_rows(
+    term: NetworkTerm, sigma: Mapping[str, float], point: ParameterVector | None
+) -> NetworkTerm:
+    outputs = term.record.outputs
+    every = np.concatenate([np.full(one.values.size, sigma[one.name]) for one in outputs])
+    residual = None if point is None else term.evaluate(point)
+    if residual is not None:
+        every = every * np.sqrt(np.maximum(np.abs(residual) / (_FAR * every), 1.0))
+    return replace(term, weighting=build_sensor_whitener(every))
+
+
+def estimate_noise(problem: Problem, point: ParameterVector) -> RowNoise:
     """Estimate the noise of the rows from the residuals: variance times autocorrelation time."""
     residuals: dict[str, list[FloatArray]] = {name: [] for name in SPEEDS}
     for term in problem.terms:

@@ -206,7 +206,7 @@ def _list_onsets(given: Values, found: FittedShifts, element: str) -> FloatArray
     times = []
     for term, shift in zip(found.problem.terms, found.shifts, strict=True):
         if shift.on == element:
-            path, warmth = term.paths["on excess"], shift.oil - REFERENCE_OIL
+            path, warmth = term.plant.paths["on excess"], shift.oil - REFERENCE_OIL
             excess = path.compute(*(given[name] for name in path.of))
             kiss = given[f"{element}.{Numbers.P0}"] * (1.0 - given["P0_temperature"] * warmth)
             friction = 1.0 - given["friction_temperature"] * warmth

@@ -250,12 +250,11 @@ def _simulate_rows(
         own = one.name.partition(".")[2]
         error = rng.standard_normal() if own in _ERRORS else 0.0
         values.append(stated[one.name].value + _SPREAD * stated[one.name].std * float(error))
-    point = ParameterVector(term.names, np.array(values))
-    run = term.simulate(point)
+    point = ParameterVector(tuple(one.name for one in term.plant.sought), np.array(values))
+    run = term.build_task(point).simulate()
     if run.status != "completed":
         return np.full((shift.time.size, len(SPEEDS)), np.nan)
-    columns = {name: run.columns[one] for name, one in term.plant.outputs.items()}
-    return term.sample(point, columns).reshape(len(SPEEDS), -1).T
+    return term.record.sample(term.show(point, run.columns)).reshape(len(SPEEDS), -1).T
 
 
 def _write_rows(

@@ -31,7 +31,7 @@ from drivetwin.estimation.direct.load_balance import AERO
 from drivetwin.estimation.likelihood.torque_record import TorqueRecord
 from drivetwin.likelihood.objective import LikelihoodObjective
 from drivetwin.likelihood.point import ParameterVector
-from drivetwin.likelihood.term import Disturbance, RecordedPlant, RecordedTerm
+from drivetwin.likelihood.term import RecordedPlant, RecordedTerm
 from drivetwin.parameters import FINAL_DRIVE, LAW_KEYS, make_ratio_id
 from drivetwin.simulation.added_elements import (
     BACKLASH,
@@ -385,12 +385,12 @@ class DualClutchPlant(RecordedPlant[TorqueRecord]):
 
     def list_disturbances(
         self, point: ParameterVector, record: TorqueRecord
-    ) -> dict[str, Disturbance]:
+    ) -> dict[str, dict[str, FloatArray]]:
         """List the errors of the engine torque that are unknowns."""
         found = {}
         read = 0.5 * (record.time[1:] + record.time[:-1]) + self.get_value(point, "te_delay")
         for name, one in self.torque_errors.items():
-            found[name] = Disturbance(ENGINE_TORQUE, -np.interp(read, one.time, one.values))
+            found[name] = {ENGINE_TORQUE: -np.interp(read, one.time, one.values)}
         return found
 
     def describe_input(self, name: str) -> str:
