@@ -14,8 +14,10 @@ _GRID = 80
 """Hinges compared before the best one is refined."""
 _HIGHEST = 3
 """Highest power of the time from the hinge."""
-_RESOLUTION = 0.01
-"""Accuracy of the refined hinge [ms]."""
+_FINER = 10
+"""Ratio of the steps of two grids [-]."""
+_RESOLUTION = 1e-5
+"""Step of the finest grid of hinges [s]."""
 
 
 class Moving(Enum):
@@ -169,35 +171,24 @@ def _solve_reduced(
 def _fit_curve(
     curves: _Curves, search: _Search, powers: tuple[int, ...], floor: float
 ) -> _Fit | None:
-    """Fit the hinge of one set of powers: best of a grid, then refined between its neighbours."""
-    from scipy.optimize import minimize_scalar
-
-    time, side = curves.time, curves.side
+    """Fit the hinge of one set of powers: the best of a grid, then of ever finer ones about it."""
+    time, side, factors = curves.time, curves.side, search.factors
     samples, unknowns = len(time), len(powers) + 2
     if samples <= unknowns:
         return None
-
-    def solve(hinge: float) -> tuple[FloatArray, float]:
-        coefficients, misfit = _solve_reduced(curves.reduce(np.array([hinge])), powers, samples)
-        return coefficients[0], float(misfit[0])
-
-    slopes, misfits = _solve_reduced(search.factors, powers, samples)
-    costs = np.where(slopes[:, 1] * search.direction > 0.0, misfits, np.inf)
-    best = int(np.argmin(costs))
-    if not np.isfinite(costs[best]):
-        return None
-    bracket = (search.grid[max(best - 1, 0)], search.grid[min(best + 1, _GRID - 1)])
-    found = minimize_scalar(
-        lambda h: solve(h)[1],
-        bounds=bracket,
-        method="bounded",
-        options={"xatol": 1e-3 * _RESOLUTION},
-    )
-    hinge = float(found.x)
-    coefficients, misfit = solve(hinge)
-    if misfit > costs[best] or coefficients[1] * search.direction <= 0.0:
-        hinge = float(search.grid[best])
-        coefficients, misfit = solve(hinge)
+    grid, step = search.grid, float(np.ptp(search.grid[:2]))
+    while True:
+        every, misfits = _solve_reduced(factors, powers, samples)
+        misfits = np.where(every[:, 1] * search.direction > 0.0, misfits, np.inf)
+        best = int(np.argmin(misfits))
+        hinge, coefficients, misfit = float(grid[best]), every[best], float(misfits[best])
+        if not np.isfinite(misfit):
+            return None
+        if step <= _RESOLUTION:
+            break
+        grid = hinge + step * np.linspace(-1.0, 1.0, 2 * _FINER + 1)
+        grid, step = np.clip(grid, search.grid[0], search.grid[-1]), step / _FINER
+        factors = curves.reduce(grid)
     variance = max(misfit / (samples - unknowns), floor**2)
     basis = curves.build_basis(hinge, powers)
     sigma = _compute_sigma(curves, hinge, basis, (powers, coefficients)) * np.sqrt(variance)

@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from drivetwin._util.arrays import FloatArray, Span, propagate_variance
 from drivetwin._util.check_arguments import check_arguments
@@ -268,6 +267,8 @@ def project_shape(
     shape: FrictionShape, mu: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Project μ (K,) at the knots, and its covariance (K, K), onto curves of `shape`."""
+    from scipy.optimize import lsq_linear  # loading takes 0.1 s, and most commands do without it
+
     if shape is FrictionShape.FREE:
         return mu, covariance
     matrix = np.tril(np.ones((mu.size, mu.size)))
