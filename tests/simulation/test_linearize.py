@@ -8,8 +8,10 @@ import math
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from drivetwin.errors import InputError
+from drivetwin.simulation.added_elements import InputShaft
 from drivetwin.simulation.driveline_run import simulate
 from drivetwin.simulation.dual_clutch import (
     Accuracy,
@@ -21,7 +23,7 @@ from drivetwin.simulation.dual_clutch import (
     State,
     Stribeck,
 )
-from drivetwin.simulation.linearize import Slip, linearise
+from drivetwin.simulation.linearize import Slip, compute_lockup_oscillation, linearise
 from drivetwin.simulation.network import Element
 
 FRICTION = Stribeck(mu_c=0.12, mu_s=0.145, v_s=6.0, mu_v=1e-4)
@@ -55,6 +57,30 @@ def test_the_lock_up_oscillation_has_the_frequency_of_two_inertias_on_a_shaft() 
     assert mode.frequency == pytest.approx(
         natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=1e-9
     )
+
+
+@pytest.mark.parametrize("damping", [318.0, 1e5])
+def test_the_lock_up_oscillation_follows_equations_12_to_14(damping: float) -> None:
+    model = dataclasses.replace(MODEL, c_o=damping)
+    before, behind = model.compute_side_inertias(model.get_overall_ratio("B3"))
+    inertia = before * behind / (before + behind)
+    zeta = damping / (2.0 * math.sqrt(inertia * model.k_o))
+    found = compute_lockup_oscillation(model, "B3")
+    assert found.damping == pytest.approx(zeta, rel=1e-6)
+    omega = math.sqrt(max(1.0 - zeta**2, 0.0) * model.k_o / inertia)
+    assert 2.0 * math.pi * found.frequency == pytest.approx(omega, rel=1e-6)
+
+
+def test_an_input_shaft_lowers_the_lock_up_oscillation() -> None:
+    model, ratio = dataclasses.replace(MODEL, c_o=0.0), MODEL.get_overall_ratio("B3")
+    front = InputShaft.from_mode(0.5 * model.J1, 60.0, 0.0)
+    before, behind = model.compute_side_inertias(ratio)
+    own, shaft = (model.eta * ratio**2 * one for one in (front.inertia, front.stiffness))
+    twist = np.diff(np.eye(3), axis=0)
+    stiffness = twist.T @ np.diag([shaft, model.k_o]) @ twist
+    squares = scipy.linalg.eigh(stiffness, np.diag([own, before - own, behind]), eigvals_only=True)
+    found = compute_lockup_oscillation(model, "B3", front)
+    assert 2.0 * math.pi * found.frequency == pytest.approx(math.sqrt(squares[1]), rel=1e-6)
 
 
 @pytest.mark.parametrize("slip", [3.0, -13.0])

@@ -7,21 +7,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
-from math import inf, pi, sqrt
+from math import inf
 from typing import Any
 
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel
 from drivetwin.dyno.scenario import ControlledActuator, Scenario
 from drivetwin.errors import InputError, Where
+from drivetwin.estimation.likelihood.effects.shaft import build_input_shaft
 from drivetwin.estimation.likelihood.effects.table import EFFECTS
 from drivetwin.parameters import get_parameter_spec
 from drivetwin.simulation.dual_clutch import (
-    DualClutch,
     FrictionTable,
     Stribeck,
     Trajectory,
-    compute_series_inertia,
 )
+from drivetwin.simulation.linearize import compute_lockup_oscillation
 from drivetwin.vehicle.effects import EffectId, parse_sizes
 
 Effects = Mapping[EffectId, float]
@@ -95,7 +95,8 @@ class Instants:
 class Truth:
     """Parameters by id (SI), friction law by element, the instants of all shifts, and effects.
 
-    Parameters and laws are those of the dual-clutch model, without the `effects` of the run.
+    Parameters and laws are those of the dual-clutch model, without the `effects` of the run; the
+    oscillation after lock-up is that with the input shaft, as sensors show it.
     """
 
     parameters: dict[str, float]
@@ -141,19 +142,6 @@ class Truth:
         }
 
 
-def compute_lockup_oscillation(model: DualClutch, ratio: float) -> tuple[float, float]:
-    """Damped frequency [Hz] and damping ratio of the gearbox side against the vehicle (eq. 14).
-
-    `ratio` is the overall ratio of the gear that is held; eqs. 12-14 of the paper in the output
-    shaft's frame, with the drums that turn in that gear.
-    """
-    drums = sum(each.drum_inertia * (ratio / each.i_c - each.i_out) ** 2 for each in model.elements)
-    before, behind = model.compute_side_inertias(ratio)
-    J = compute_series_inertia(before + drums, behind)
-    zeta = model.c_o / (2.0 * sqrt(J * model.k_o))
-    return sqrt(model.k_o / J * (1.0 - zeta**2)) / (2.0 * pi), zeta
-
-
 def compute_truth(scenario: Scenario, trajectory: Trajectory, effects: Effects) -> Truth:
     """Compute the true parameters and instants of a run.
 
@@ -164,7 +152,12 @@ def compute_truth(scenario: Scenario, trajectory: Trajectory, effects: Effects) 
     engine_side = model.J1 * model.eta + model.J2e
     delays = {sensor.role: sensor.delay for sensor in scenario.sensors}
     ratios = {gear.name: scenario.get_ratio(gear.element) for gear in scenario.gears}
-    rings = {gear: compute_lockup_oscillation(model, ratios[gear]) for gear in list(ratios)[1:]}
+    mode = effects.get(EffectId.INPUT_SHAFT_MODE, 0.0)
+    front = build_input_shaft(model, mode) if mode > 0.0 else None
+    rings = {
+        gear.name: compute_lockup_oscillation(model, gear.element, front)
+        for gear in scenario.gears[1:]
+    }
     parameters = {
         "eta": model.eta,
         **{
@@ -176,8 +169,8 @@ def compute_truth(scenario: Scenario, trajectory: Trajectory, effects: Effects) 
         "Tv_over_if": (model.load.constant + model.load.rolling) / model.i_f,
         "k_o": model.k_o,
         "c_o": model.c_o,
-        **{f"f_d_{gear}": frequency for gear, (frequency, _) in rings.items()},
-        **{f"zeta_{gear}": zeta for gear, (_, zeta) in rings.items()},
+        **{f"f_d_{gear}": one.frequency for gear, one in rings.items()},
+        **{f"zeta_{gear}": one.damping for gear, one in rings.items()},
         **{f"P0.{element.name}": element.P0 for element in model.elements},
         "te_delay": delays["engine_torque"],
     }

@@ -17,6 +17,7 @@ from scipy.linalg import null_space
 
 from drivetwin._native import linearise as native_linearise
 from drivetwin.errors import InputError
+from drivetwin.simulation.added_elements import AddedElements, InputShaft, OpenConverter
 from drivetwin.simulation.driveline import SHAFT, build_driveline
 from drivetwin.simulation.dual_clutch import DualClutch, FloatArray
 from drivetwin.simulation.element_schema import (
@@ -35,6 +36,9 @@ SHAFT_TORQUE: Output = ("shaft_torque", SHAFT)
 
 _ZERO = 1e-12
 """Relative size of numbers that are zero but for round-off."""
+
+_STILL = 1e-9
+"""Eigenvalue over the largest one below which it is that of a free motion."""
 
 _HELD = {"prescribed_speed": "input", "engine_map": "throttle"}
 """Elements that take no part in a linear system, and their field that names the input."""
@@ -86,7 +90,7 @@ class LinearSystem:
         values = self.compute_eigenvalues()
         sizes = np.abs(values)
         # Round-off parts the two equal eigenvalues of critical damping by its square root.
-        pairs = values[values.imag > np.maximum(1e-6 * sizes, 1e-9 * sizes.max(initial=1.0))]
+        pairs = values[values.imag > np.maximum(1e-6 * sizes, _STILL * sizes.max(initial=1.0))]
         found = [
             Oscillation(float(v.imag / (2 * np.pi)), float(-v.real / np.abs(v))) for v in pairs
         ]
@@ -193,6 +197,24 @@ def linearise(
         tuple(inputs[i] for i in moving),
         tuple(outputs),
     )
+
+
+def compute_lockup_oscillation(
+    model: DualClutch, locked: str, front: InputShaft | OpenConverter | None = None
+) -> Oscillation:
+    """Compute the oscillation after lock-up: the slowest mode with the element `locked`.
+
+    Without an input shaft in `front` of the gearbox it is that of eqs. 12-14 of the paper. An open
+    converter in front leaves J1, the turbine's inertia, to swing. Where nothing swings, the
+    frequency is 0 and the damping ratio that of the two slowest decays.
+    """
+    system = linearise(build_driveline(model, AddedElements(front=front)), [locked])
+    found = system.find_oscillations()
+    if found:
+        return found[0]
+    rates = np.abs(system.compute_eigenvalues())
+    one, other = rates[rates > _STILL * rates[-1]][:2]
+    return Oscillation(0.0, float((one + other) / (2.0 * np.sqrt(one * other))))
 
 
 def find_fastest_rate(elements: Sequence[Element], locked: Sequence[str]) -> float:

@@ -18,6 +18,7 @@ from drivetwin.estimation.likelihood.effects.synthetic_vehicle import SyntheticV
 from drivetwin.estimation.likelihood.torque_record import OUTPUT_TORQUE
 from drivetwin.simulation.added_elements import InputShaft, ShaftTable, TyreSlip, compute_gap
 from drivetwin.simulation.driveline import OUTPUT, WHEEL
+from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.vehicle.effects import EffectId
 
 _MODE_SHARE, _MODE_DAMPING = 0.5, 0.06
@@ -30,9 +31,14 @@ def build_input_shaft_mode(at: OperatingPoint, std: float) -> list[Disturbance]:
     return []
 
 
+def build_input_shaft(model: DualClutch, frequency: float) -> InputShaft:
+    """Build the shaft of a synthetic log, with its mode at a `frequency` [Hz]."""
+    return InputShaft.from_mode(_MODE_SHARE * model.J1, frequency, _MODE_DAMPING)
+
+
 def apply_input_shaft_mode(vehicle: SyntheticVehicle, size: float) -> SyntheticVehicle:
     """Put a shaft into J1."""
-    front = InputShaft.from_mode(_MODE_SHARE * vehicle.model.J1, size, _MODE_DAMPING)
+    front = build_input_shaft(vehicle.model, size)
     return replace(vehicle, added=replace(vehicle.added, front=front))
 
 

@@ -33,7 +33,7 @@ from drivetwin.estimation.result.cause import Group
 from drivetwin.estimation.result.estimate import CardNumber, CardNumberKind
 from drivetwin.likelihood.point import ParameterVector
 from drivetwin.parameters import OVER_ETA, get_parameter_spec, make_law_id
-from drivetwin.simulation.dual_clutch import compute_series_inertia
+from drivetwin.simulation.linearize import compute_lockup_oscillation
 
 TORQUE_LIKE = ("J_prime", "J_out", "J_vehicle", "Tv_over_if", "k_o", "c_o", "drum", "mu_gain")
 """Stems of parameters that share the one scale that only an output torque shows."""
@@ -62,8 +62,11 @@ def compute_parameters(
     for name in DIRECT:
         values |= {make_log_id(name, one.log): one.get_value(point, name) for one in structures}
     for structure, s in zip(structures, signals, strict=True):
-        f_d, zeta = compute_oscillation(structure, point)
-        values |= {f"f_d_{s.shift.end_gear}": f_d, f"zeta_{s.shift.end_gear}": zeta}
+        model, gear = structure.build_model(point), s.shift.end_gear
+        added = structure.build_added_elements(point, model)
+        oncoming = structure.driveline.oncoming.name
+        ringing = compute_lockup_oscillation(model, oncoming, added.front)
+        values |= {f"f_d_{gear}": ringing.frequency, f"zeta_{gear}": ringing.damping}
         for element in structure.elements:
             values[f"P0.{element.name}"] = structure.get_value(point, f"{element.name}.P0")
         for element in structure.elements:
@@ -119,20 +122,6 @@ def list_absolute_ids(signals: Sequence[ShiftSignals]) -> tuple[str, ...]:
     logs = dict.fromkeys(s.log for s in signals)
     others = [make_log_id(stem, log) for stem in TORQUE_LIKE if stem in DIRECT for log in logs]
     return ("eta", *(f"J_prime_{gear}" for gear in gears), *dict.fromkeys(others))
-
-
-def compute_oscillation(structure: DualClutchPlant, point: ParameterVector) -> tuple[float, float]:
-    """Compute the damped frequency [Hz] and damping ratio of the lock-up oscillation."""
-    after = structure.compute_ratio_after(point)
-    inertia = structure.get_value(point, "J_e")
-    for one in (*structure.elements, *structure.spinning):
-        inertia += structure.get_value(point, f"{one.name}.drum") * (one.a - one.b / after) ** 2
-    J4 = inertia * after**2 + structure.get_value(point, "J_out")
-    J5 = structure.get_value(point, "J_vehicle") / structure.get_final_drive(point) ** 2
-    J = compute_series_inertia(J4, J5)
-    k_o, c_o = structure.get_value(point, "k_o"), structure.get_value(point, "c_o")
-    zeta = c_o / (2.0 * np.sqrt(J * k_o))
-    return float(np.sqrt(k_o / J * max(1.0 - zeta**2, 0.0)) / (2.0 * np.pi)), float(zeta)
 
 
 def compute_jacobian(
