@@ -81,7 +81,7 @@ def _list_assignments(nodes: list[ast.stmt]) -> Iterator[tuple[str, ast.expr]]:
 
 
 def _has_number(value: ast.expr) -> bool:
-    """Whether an expression has a numeric literal."""
+    """Return whether an expression has a numeric literal."""
     return any(
         isinstance(node, ast.Constant)
         and isinstance(node.value, int | float)

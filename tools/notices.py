@@ -47,7 +47,7 @@ class Crate:
 
 @dataclass(frozen=True)
 class Linked:
-    """What cargo knows of the linked crates: packages, and their dependencies, by id."""
+    """Metadata of the linked crates by cargo: packages, and their dependencies, by id."""
 
     packages: dict[str, dict[str, Any]]
     needs: dict[str, list[str]]

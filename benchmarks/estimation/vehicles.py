@@ -42,7 +42,7 @@ LOGGERS = (
 TORQUES = {"engine_torque": (0.02, 5.0), "output_torque": (0.01, 20.0)}
 """Standard deviations of gain and offset [N m] of the torque sensors."""
 PRESSURE = (0.005, 2e3)
-"""Those of every pressure sensor, the offset in Pa."""
+"""Standard deviations of gain and offset [Pa] of every pressure sensor."""
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ class Problem:
     start: Callable[[Values], Values]
     known: frozenset[str] = frozenset()
     is_rounded: bool = False
-    """Whether channels are rounded to the standard deviation of their noise."""
+    """True if channels are rounded to the standard deviation of their noise."""
 
     @property
     def delays(self) -> dict[str, str]:

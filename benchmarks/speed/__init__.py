@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""How fast a shift is simulated beside other programs: `python -m benchmarks.speed`."""
+"""Speed of the simulation of a shift beside other programs: `python -m benchmarks.speed`."""

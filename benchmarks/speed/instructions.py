@@ -14,7 +14,7 @@ from tests.support.upshift.scenario import Scenario
 from tests.support.upshift.statement import SAMPLES, STEP, Inputs, Problem, start
 
 _TARGET = "haswell"
-"""What both are counted for: valgrind knows instructions up to AVX2."""
+"""Instruction set of both counts: valgrind knows instructions up to AVX2."""
 _DRIVER = """
 #include <stdio.h>
 int shift_sim(const double*, const double*, const double*, int, double, int, double*, double*, int);

@@ -30,7 +30,7 @@ class Group(StrEnum):
 
 @dataclass(frozen=True)
 class Quality:
-    """How far a solution is off: the error with its unit, and that of the events [s]."""
+    """Error of a solution with its unit, and that of the events [s]."""
 
     error: float
     unit: str

@@ -268,7 +268,7 @@ class Number:
 
 
 Value = str | float | Number
-"""What fills a template: a name, a number without unit, or a number."""
+"""Content of a field in a template: a name, a number without unit, or a number."""
 
 
 @dataclass(frozen=True)
@@ -306,7 +306,7 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """What to do, as a sentence; empty where nothing helps."""
+        """Remedy as a sentence; empty where nothing helps."""
         return self._fill(load_catalogue()[self.code].remedy)
 
     @property

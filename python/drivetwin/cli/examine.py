@@ -51,7 +51,7 @@ def examine(request: Examine) -> Outcome:
     for name in request.profile if request.model is None else ():
         get_parameter_spec(name)
     if (request.model is None) == (request.vehicle is None):
-        raise InputError("name what the log is of", "give --vehicle CARD or --model MODEL")
+        raise InputError("examine needs one card or model", "give --vehicle CARD or --model MODEL")
     examined = _examine_fit if request.model is not None else _examine_log
     answers, outcome = examined(request)
     files = outcome.files

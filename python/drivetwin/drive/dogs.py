@@ -119,7 +119,7 @@ _HELD, _CONE = "held output", "cone"
 
 @dataclass(frozen=True)
 class _Closing:
-    """How a starting clutch closes: it takes up `torque` [N m] within `ramp` [s] and slips."""
+    """Engagement of a starting clutch: it takes up `torque` [N m] within `ramp` [s] and slips."""
 
     clutch: str
     pedal: float

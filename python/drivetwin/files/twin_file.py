@@ -52,7 +52,7 @@ _HEADER = (
 
 
 class ChannelRecord(Record):
-    """How a role is read from a log: sign*(scale*column + offset) in `unit`, shifted in time.
+    """Reading of a role from a log: sign*(scale*column + offset) in `unit`, shifted in time.
 
     `file_unit` is the unit that the log named; `unit` overrides it.
     """
@@ -73,7 +73,7 @@ class ChannelRecord(Record):
 
 
 class LogRecord(Record):
-    """How logs are read as a whole: time column, reference torque, DBC files, ignored columns."""
+    """Reading of whole logs: time column, reference torque, DBC files, ignored columns."""
 
     time_source: str | None = None
     time_unit: str | None = None

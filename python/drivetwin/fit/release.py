@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers beside the unknowns at a minimum: those that matter become coordinates with a prior.
+"""Release of fixed numbers at a minimum: the influential ones become coordinates with a prior.
 
 With the priors of these coordinates, the inverse of the information at the common minimum is the
 covariance of the unknowns widened by what is known roughly.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report of a fleet: one page, drawn with what the report of a log is drawn with."""
+"""Report of a fleet: one page, drawn with the blocks of the report of a log."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ class Session:
 
     @_hold_lock
     def update(self, change: Callable[[SessionState], SessionState]) -> None:
-        """Change the state. Raises what the change raises; the state stays as it was then."""
+        """Change the state. Errors of the change pass on; the state stays as it was then."""
         self._set(change(self.work))
 
     @_hold_lock

@@ -57,7 +57,7 @@ def build_measured_subject(
     """Model of the first shift of a log between `gears` (None: any), and that shift's inputs.
 
     With `as_logged` the inputs are the log's own signals, and the model runs later by their delay.
-    Raises NoShiftError where there is no such shift, and what the validation of a shift raises.
+    Raises NoShiftError where there is no such shift, and the errors of the validation of a shift.
     """
     found = require_shifts(log, twin.build_card()).shifts
     wanted = [one for one in found if gears in (None, (one.start_gear, one.end_gear))]

@@ -27,7 +27,7 @@ from drivetwin.vehicle.spec import SensorTolerance
 SIZE = 0.01
 """Gain error, and offset in shares of a sensor's largest reading."""
 DELAY = 1e-3
-"""How much older values are than their stamps [s]."""
+"""Age of values at their stamps [s]."""
 FRICTION = "mu."
 """Start of the id of μ of an element, at `slips` of the sensitivity."""
 
