@@ -35,6 +35,7 @@ from drivetwin.fit.network_model import NetworkModel
 from drivetwin.fit.omissions import ShownOmission
 from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.profile import trace_slow, widen
+from drivetwin.fit.release import RELEASE
 from drivetwin.fit.search import FoundMinimum
 from drivetwin.fit.unknown import PlacedNumber, SoughtNumber
 from drivetwin.likelihood.coloured_noise import split_whitened
@@ -396,12 +397,15 @@ def _describe_moved(
     sought: Sequence[SoughtNumber],
     fixed: Sequence[FixedNumber],
 ) -> Iterator[MovedNumber]:
-    """Yield the fixed numbers at a minimum, of which they are the last coordinates."""
+    """Yield the fixed numbers at a minimum, of which they are the last coordinates, but for those
+    that neither widen an unknown nor are seen."""
     first = len(minimum.point.names) - len(fixed)
     variance = np.diag(covariance)
     for k, one in enumerate(fixed, start=first):
         shares = covariance[k, : len(sought)] ** 2 / (variance[k] * variance[: len(sought)])
         most = int(np.argmax(shares))
+        if shares[most] < RELEASE.widening and variance[k] * (1.0 + RELEASE.visible) > 1.0:
+            continue
         value = one.move(one.value, float(minimum.point.values[k]))
         std = one.std * float(np.sqrt(variance[k]))
         std *= value / one.value if one.is_relative else 1.0
@@ -413,9 +417,11 @@ def _report_omissions(
 ) -> Iterator[Finding]:
     """Yield a finding for each omission that is in the model, one of the `moved` numbers."""
     for one in shown:
-        at = next(each for each in moved if each.number is one.number)
-        if abs(at.value - at.number.value) < Z95 * at.std and not at.number.is_relative:
+        at = next((each for each in moved if each.number is one.number), None)
+        if at is None:
             continue  # another omission has taken its place
+        if abs(at.value - at.number.value) < Z95 * at.std and not at.number.is_relative:
+            continue
         size = Number(at.value, one.number.unit or "1", Z95 * at.std)
         subject = " or ".join((one.number.name, *one.rivals))
         yield report(

@@ -13,10 +13,10 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin._util.progress import scale_progress
 from drivetwin.errors import IdentificationError
 from drivetwin.fit.fixed_numbers import FixedNumber
-from drivetwin.fit.omissions import ShownOmission, complete_model
+from drivetwin.fit.omissions import ShownOmission, complete_model, is_explained
 from drivetwin.fit.plant import NetworkTerm, Problem
 from drivetwin.fit.recording import lower_noise
-from drivetwin.fit.release import release_fixed
+from drivetwin.fit.release import extend, release_fixed
 from drivetwin.fit.unknown import SoughtNumber
 from drivetwin.likelihood.budget import MAX_REFIT_WORK, BudgetExceeded, limit_evaluations
 from drivetwin.likelihood.gauss_newton import OptimizeResult, minimise
@@ -93,28 +93,59 @@ def search(
     IdentificationError
         Where no draw can be simulated, or no start leads to a minimum.
     """
-    spread = np.zeros(start.values.size)
-    spread[: len(sought)] = [_get_spread(one) for one in sought]
+    guess = _Guess(start, np.array([_get_spread(one) for one in sought]), seed)
+    moved: tuple[FixedNumber, ...] = ()
     with scale_progress(0.0, 0.58):
-        found = _seek(problem, start, spread, seed)
+        attempts = _refine_guess(problem, guess)
+        if fixed and not _is_noise(attempts):
+            # Wrong fixed numbers lead the unknowns astray: all are sought from the first guess.
+            moved = tuple(fixed)
+            problem, point = extend(problem, start, moved)
+            guess = replace(guess, point=point)
+            attempts = _refine_guess(problem, guess)
+        found = _seek(problem, guess, attempts)
     with scale_progress(0.58, 1.0):
         first, found = found, _lower_estimates(found)
-        best = found.result
-        if found is not first and not _is_explained(best.normal.cost / problem.size, problem.size):
-            again = _seek(best.problem, start, spread, seed)
-            if again.result.normal.cost < best.normal.cost:
+        if found is not first and not is_explained(found.result):
+            quieter = found.result.problem
+            again = _seek(quieter, guess, _refine_guess(quieter, guess))
+            if again.result.normal.cost < found.result.normal.cost:
                 found = _lower_estimates(again)
-        return _complete(found, fixed, len(sought), stated)
+        try:
+            with limit_evaluations(MAX_REFIT_WORK):
+                if not moved:
+                    best, moved = release_fixed(found.result, fixed, len(sought))
+                    found = replace(found, result=best)
+        except BudgetExceeded:
+            return replace(found, is_limited=True)
+        return _complete(replace(found, fixed=moved), stated)
 
 
-def _seek(problem: Problem, start: ParameterVector, spread: FloatArray, seed: int) -> FoundMinimum:
-    """Find the minimum over the unknowns, from the first guess and from draws about it."""
-    coarse = _coarsen(problem)
-    attempts = Attempts(coarse)
+@dataclass(frozen=True, eq=False)
+class _Guess:
+    """First guess of all unknowns, and the standard deviations (k,) of the draws of the first ones;
+    the others stay at it."""
+
+    point: ParameterVector
+    spread: FloatArray
+    seed: int
+
+
+def _refine_guess(problem: Problem, guess: _Guess) -> Attempts[Problem]:
+    """Minimise from the first guess, on fewer samples."""
+    attempts = Attempts(_coarsen(problem))
+    with suppress(BudgetExceeded), limit_evaluations(FIT_SEARCH.work):
+        attempts.refine(guess.point)
+    return attempts
+
+
+def _seek(problem: Problem, guess: _Guess, attempts: Attempts[Problem]) -> FoundMinimum:
+    """Find the minimum from the first guess, where the `attempts` begin, and from draws about
+    it."""
+    spread = np.pad(guess.spread, (0, guess.point.values.size - guess.spread.size))
     with suppress(BudgetExceeded), limit_evaluations(FIT_SEARCH.work) as budget:
-        attempts.refine(start)
         if not _is_settled(attempts):
-            for _ in refine_draws(attempts, start, spread, seed):
+            for _ in refine_draws(attempts, guess.point, spread, guess.seed):
                 if _is_settled(attempts):
                     break
     if not attempts.starts:
@@ -126,27 +157,18 @@ def _seek(problem: Problem, start: ParameterVector, spread: FloatArray, seed: in
     return FoundMinimum(best, tuple(attempts.starts), attempts.agreeing, budget.left < 0.0)
 
 
-def _complete(
-    found: FoundMinimum, fixed: Sequence[FixedNumber], count: int, stated: Collection[str]
-) -> FoundMinimum:
-    """Minimise over the fixed numbers and the omissions as well, from the minimum over `count`
-    unknowns of the network; that minimum where the work of a refit does not suffice."""
-    try:
-        with limit_evaluations(MAX_REFIT_WORK):
-            best, moved = release_fixed(found.result, fixed, count)
-    except BudgetExceeded:
-        return replace(found, is_limited=True)
+def _complete(found: FoundMinimum, stated: Collection[str]) -> FoundMinimum:
+    """Minimise over the omissions as well."""
+    best = found.result
     complete = complete_model(best, stated)
     best, shown = complete.result, complete.shown
-    size = best.problem.size
-    is_limited = found.is_limited and not _is_explained(best.normal.cost / size, size)
+    is_limited = found.is_limited and not is_explained(best)
     best = best if is_limited else expect_inputs(best.problem, best) or best
-    beside = (*moved, *(one.number for one in shown))
     return replace(
         found,
         result=best,
         is_limited=is_limited,
-        fixed=beside,
+        fixed=(*found.fixed, *(one.number for one in shown)),
         shown=shown,
         spread=complete.spread,
     )
@@ -161,17 +183,17 @@ def _coarsen(problem: Problem) -> Problem:
     return replace(problem, terms=tuple(terms))
 
 
-def _is_explained(chi2: float, size: int, deviations: float = 3.0) -> bool:
-    """Return whether Q per sample is 1 within so many standard deviations of its scatter."""
-    return chi2 < 1.0 + deviations * float(np.sqrt(2.0 / size))
+def _is_noise(attempts: Attempts[Problem], deviations: float = 3.0) -> bool:
+    """Return whether the least Q per sample is 1 within so many standard deviations of its
+    scatter."""
+    return attempts.chi2 < 1.0 + deviations * float(np.sqrt(2.0 / attempts.problem.size))
 
 
 def _is_settled(attempts: Attempts[Problem]) -> bool:
     """Return whether the best start needs no other: it explains the recordings, and where its Q is
     beyond one standard deviation of the scatter, another start has led to it. A wrong minimum may
     be no more than 3 % above the right one."""
-    least = 1.0 if attempts.agreeing < 2 else 3.0
-    return _is_explained(attempts.chi2, attempts.problem.size, least)
+    return _is_noise(attempts, 1.0 if attempts.agreeing < 2 else 3.0)
 
 
 def _is_far(cost: float, size: int) -> bool:

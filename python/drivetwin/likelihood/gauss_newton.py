@@ -15,7 +15,7 @@ predicts the smallest decrease (Lemaréchal 1975).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -35,7 +35,7 @@ RCOND = 1e-13
 
 @dataclass(frozen=True)
 class GaussNewtonSettings:
-    """Settings of the damped Gauss-Newton search; decreases are of Q [-]."""
+    """Settings of the damped Gauss-Newton search; decreases are of Q over its excess [-]."""
 
     ftol: float = 1e-2
     """Predicted decrease at which the search ends: 0.1 standard deviations [-]."""
@@ -76,6 +76,15 @@ class GaussNewtonSettings:
     not known [-]."""
     rough_rtol: float = 1e-3
     """Decrease relative to Q at which a rough search ends [-]."""
+
+    def scale(self, unit: float) -> GaussNewtonSettings:
+        """Return the settings with all decreases times `unit`."""
+        return replace(
+            self,
+            ftol=unit * self.ftol,
+            kink_ftol=unit * self.kink_ftol,
+            local_decrease=unit * self.local_decrease,
+        )
 
 
 @dataclass(frozen=True)
@@ -192,13 +201,14 @@ def minimise(
     are then no estimate.
     """
     point = start.replace_values(np.clip(start.values, problem.lower, problem.upper))
-    damping, first = settings.initial_damping, None
+    damping, first, usual = settings.initial_damping, None, settings
     weighting = _Weighting(refresh, settings.patience)
     max_iter, crawls = settings.rough_max_iter if rough else settings.max_iter, 0
     for iteration in range(max_iter):
         problem, point, normal = weighting.reweight(problem, point)
         if normal is None:
             return None
+        settings = usual.scale(normal.excess)
         expected = predict_decrease(problem, point, normal.information, normal.gradient)
         first = first or expected
         notify_progress(_estimate_progress(first, expected, settings.ftol, iteration))

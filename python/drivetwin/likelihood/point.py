@@ -116,6 +116,11 @@ class NormalEquations:
     regressors: tuple[FloatArray, ...]
     slopes: tuple[FloatArray, ...] = ()
 
+    @property
+    def excess(self) -> float:
+        """Return Q per residual, at least 1: a difference of Q over it is one of deviations."""
+        return max(self.cost / sum(one.size for one in self.residuals), 1.0)
+
 
 class Objective(Protocol):
     """Weighted sum of squares Q(θ) with bounds on θ; `lower` and `upper` (p,)."""
