@@ -46,7 +46,7 @@ from drivetwin.estimation.likelihood.torque_record import build_record
 from drivetwin.likelihood.input_smoothing import smooth_adaptive
 from drivetwin.likelihood.measured_signal import MeasuredSignal, estimate_quantization_error
 from drivetwin.likelihood.point import ParameterVector, Prior
-from drivetwin.likelihood.recorded_data import RECORD
+from drivetwin.likelihood.recorded_data import RECORD, RecordedData
 from drivetwin.likelihood.term import RecordedTerm
 from drivetwin.parameters import OVER_ETA, SPECS, is_ratio
 from drivetwin.shifts.shift import compute_exclusive_spans
@@ -145,21 +145,9 @@ def build_problem(
     follow = {f"{e}.{key}": one.value for e in partners for key, one in FOLLOWER_PRIOR.items()}
     guess = _add_log_values({**ratios, **follow, **guess}, logs)
     priors = _collect_priors(signals, drivelines, guess)
-    every = (
-        *_expand_logs(COMMON, logs),
-        *_list_law_coefficients(signals, drivelines),
-        *_list_fill_unknowns(drivelines),
-        *(name for name in ratios if name in priors),
-    )
-    names = [n for n in every if not _is_fixed(priors.get(n))]
     inertias = list_gear_inertias(signals, drivelines)
     tie = build_tie(inertias)
-    still = [s for s in signals if not is_delay_identifiable(s.engine_torque)]
-    delays = {map_log_names(s.log).get("te_delay", "te_delay") for s in still}
-    absent = {"eta": not signals[0].scale_known, "J_e": tie is not None}
-    names = [n for n in names if not absent.get(n, n in delays)]
-    names += [n for n in _expand_logs((TE_OFFSET, AERO), logs) if n in priors]
-    names += [n for n in priors if n.startswith(f"{MAP_POINT}.")]
+    names = _list_unknowns(signals, drivelines, priors, is_tied=tie is not None)
     fixed = {AERO: 0.0, **guess} | {n: p.value for n, p in priors.items() if _is_fixed(p)}
     load_factors = (
         _build_load_factors(signals) if hilly and "Tv_over_if" not in drivelines[0].known else {}
@@ -184,10 +172,7 @@ def build_problem(
             torque_errors={n: one for n, one in _list_torque_errors(s).items() if n in names},
         )
         terms.append(RecordedTerm.from_sensor_noise(structure, record))
-        first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
-        wheel = first.get("wheel_speed", first["output_speed"] / d.i_f)
-        torque = first.get("output_torque", guess["Tv_over_if"])
-        values = (first["output_speed"], wheel, torque / guess["k_o"])
+        values = _guess_start(record, d, guess)
         start |= {f"{label}.{key}": v for key, v in zip(START, values, strict=True)}
     start |= {n: guess.get(n, 0.0) for each in load_factors.values() for n in each}
     begin = ParameterVector(tuple(start), np.array(list(start.values())))
@@ -200,6 +185,43 @@ def build_problem(
     sums = list_sum_priors(inertias, drivelines[0], guess["eta"])
     prior = add_sum_priors(prior, point, fixed, sums)
     return DualClutchProblem(tuple(terms), prior, lower, upper), point
+
+
+def _list_unknowns(
+    signals: Sequence[ShiftSignals],
+    drivelines: Sequence[KnownDriveline],
+    priors: Mapping[str, PriorValue],
+    *,
+    is_tied: bool,
+) -> list[str]:
+    """List the unknowns beside the starts and loads of the runs.
+
+    J_e is none where the inertias of the gears are tied.
+    """
+    logs = tuple(dict.fromkeys(s.log for s in signals))
+    every = (
+        *_expand_logs(COMMON, logs),
+        *_list_law_coefficients(signals, drivelines),
+        *_list_fill_unknowns(drivelines),
+        *dict.fromkeys(n for d in reversed(drivelines) for n in d.ratio_values if n in priors),
+    )
+    names = [n for n in every if not _is_fixed(priors.get(n))]
+    still = [s for s in signals if not is_delay_identifiable(s.engine_torque)]
+    delays = {map_log_names(s.log).get("te_delay", "te_delay") for s in still}
+    absent = {"eta": not signals[0].scale_known, "J_e": is_tied}
+    names = [n for n in names if not absent.get(n, n in delays)]
+    names += [n for n in _expand_logs((TE_OFFSET, AERO), logs) if n in priors]
+    return names + [n for n in priors if n.startswith(f"{MAP_POINT}.")]
+
+
+def _guess_start(
+    record: RecordedData, driveline: KnownDriveline, guess: Mapping[str, float]
+) -> tuple[float, float, float]:
+    """Guess the unknowns `START` of a run from the first samples of its record."""
+    first = {out.name: float(np.mean(out.values[:10])) for out in record.outputs}
+    wheel = first.get("wheel_speed", first["output_speed"] / driveline.i_f)
+    torque = first.get("output_torque", guess["Tv_over_if"])
+    return first["output_speed"], wheel, torque / guess["k_o"]
 
 
 def _expand_logs(names: Sequence[str], logs: Sequence[int]) -> list[str]:
