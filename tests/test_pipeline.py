@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import InputError, PlausibilityError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.findings import Code
+from drivetwin.vehicle.spec import PriorValue
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +87,36 @@ def test_torques_that_no_gearbox_explains_are_refused(
     with pytest.raises(PlausibilityError, match="output torque is 8") as refusal:
         drivetwin.identify(tenth, card, shifts)
     assert "scale and unit of 'EngTrq'" in refusal.value.remedy
+
+
+@pytest.mark.parametrize("without", ["wheel_speed", "output_torque"])
+def test_torques_that_count_against_the_acceleration_are_refused(
+    data: tuple[Any, Any, Any], tmp_path: Path, without: str
+) -> None:
+    log, card, shifts = data
+    mapping = tmp_path / "map.toml"
+    roles = {"EngTrq": "engine_torque", "TrqOut": "output_torque"}
+    entries = (f'channels.{roles[one]} = {{ source = "{one}", sign = -1 }}' for one in roles)
+    mapping.write_text("\n".join(entries), "utf-8")
+    contrary = drivetwin.read_log(log.source, card, mapping)
+    kept = {role: one for role, one in contrary.channels.items() if role != without}
+    with pytest.raises(PlausibilityError, match="'EngTrq' falls where the vehicle") as refusal:
+        drivetwin.identify(replace(contrary, channels=kept), card, shifts)
+    assert 'source = "EngTrq", sign = -1' in refusal.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("wrong", "key"),
+    [
+        ({"J_vehicle_range": (2.5, 6.5)}, "inertia.J_vehicle_kgm2"),
+        ({"J_out": PriorValue(900.0, 90.0)}, "inertia.J_out_kgm2"),
+        ({"J_prime_range": (5e3, 4e4)}, "inertia.J_prime_kgm2"),
+    ],
+)
+def test_inertias_that_no_driveline_has_are_refused_by_their_row(
+    data: tuple[Any, Any, Any], wrong: dict[str, Any], key: str
+) -> None:
+    log, card, shifts = data
+    with pytest.raises(PlausibilityError, match="is not a usual") as refusal:
+        drivetwin.identify(log, replace(card, **wrong), shifts)
+    assert refusal.value.where.key == key

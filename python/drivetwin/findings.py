@@ -49,6 +49,7 @@ class Code(StrEnum):
     FILLING_UNKNOWN = auto()
     FINAL_DRIVE_DIFFERS = auto()
     TORQUES_DIFFER = auto()
+    TORQUE_REVERSED = auto()
     CLOCK_LATE = auto()
     CLOCKS_DRIFT = auto()
     TORQUE_CLOCK_LATE = auto()

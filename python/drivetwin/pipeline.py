@@ -168,8 +168,8 @@ def identify_jointly(
 
 
 IMPOSSIBLE = 2.0
-"""Factor beyond a usual ratio of the torques from which no gearbox explains it: several times what
-load and losses do, and less than a wrong power of ten."""
+"""Factor beyond a usual range from which no driveline explains a number: several times what load,
+losses and sizes do, and less than a wrong power of ten."""
 
 
 def _refuse_wrong_channels(log: ShiftLog, card: VehicleCard, found: FoundShifts) -> None:
@@ -182,10 +182,7 @@ def _refuse_wrong_channels(log: ShiftLog, card: VehicleCard, found: FoundShifts)
     contrary = {
         one.names["gear"]: one
         for one in log.findings
-        if one.code is Code.TORQUES_DIFFER
-        and not one.numbers["low"].value / IMPOSSIBLE
-        <= one.numbers["share"].value
-        <= one.numbers["high"].value * IMPOSSIBLE
+        if one.code is Code.TORQUES_DIFFER and not _is_possible(one, "share")
     }
     gears = {gear for one in found.shifts for gear in (one.start_gear, one.end_gear)}
     if gears and gears <= contrary.keys():
@@ -195,6 +192,21 @@ def _refuse_wrong_channels(log: ShiftLog, card: VehicleCard, found: FoundShifts)
     for one in find_causes(log, card):
         if one.code is Code.PRESSURES_EXCHANGED:
             raise MappingError(one.cause, one.remedy, Where(file=log.source))
+
+
+def _refuse_impossible(doubts: Sequence[Finding], log: ShiftLog) -> None:
+    """Raise PlausibilityError for a reversed torque, and for an inertia that no driveline has."""
+    for one in doubts:
+        if one.code is Code.TORQUE_REVERSED:
+            raise PlausibilityError(one.cause, one.remedy, Where(file=log.source))
+        if one.code is Code.CARD_INERTIA_UNUSUAL and not _is_possible(one):
+            raise PlausibilityError(one.cause, one.remedy, one.place)
+
+
+def _is_possible(one: Finding, name: str = "found") -> bool:
+    """Return whether a number of a finding is near its usual range."""
+    found, low, high = (one.numbers[key].value for key in (name, "low", "high"))
+    return low / IMPOSSIBLE <= found <= high * IMPOSSIBLE
 
 
 def _identify_actuators(logs: Sequence[ShiftLog], card: VehicleCard) -> FoundActuators:
@@ -215,6 +227,7 @@ def _prepare_checked(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> P
     """Prepare a log, with what is implausible on the card among its findings."""
     prepared = prepare(log, card, shifts)
     doubts = check_card(card, log, shifts.shifts)
+    _refuse_impossible(doubts, log)
     gains = get_usual_gains(log, card, turbine_driven=prepared.turbine_driven)
     usual = [f"{one.replace('_', ' ')} {100.0 * gain:g} %" for one, gain in gains.items()]
     assumed = [report(Code.NO_SENSOR_TOLERANCES, gains=", ".join(usual))] if usual else []

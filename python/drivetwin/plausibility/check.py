@@ -15,7 +15,12 @@ from drivetwin.errors import MissingChannelError, TimeError
 from drivetwin.findings import Code, Finding, Number, report
 from drivetwin.parameters import FINAL_DRIVE, make_ratio_id
 from drivetwin.plausibility.entries import PLAUSIBILITY, check_entries, find_entry
-from drivetwin.plausibility.friction import check_friction, check_inertias, sample_span
+from drivetwin.plausibility.friction import (
+    check_friction,
+    check_inertias,
+    check_torque_signs,
+    sample_span,
+)
 from drivetwin.shifts.detect import find_causes
 from drivetwin.shifts.shift import (
     HeldRatio,
@@ -134,7 +139,7 @@ def check_card(
         return tuple(found)
     if OUTPUT_INERTIA in {one.place.key for one in found}:
         card = replace(card, J_out=None)
-    causes = (*find_causes(log, card), *_check_ambient(log, card))
+    causes = (*find_causes(log, card), *_check_ambient(log, card), *check_torque_signs(log, card))
     differing = check_ratios(log, card)
     found += differing
     if any(one.code is Code.PRESSURES_EXCHANGED for one in causes):

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray, Span
-from drivetwin.channels.roles import make_pressure_role
+from drivetwin.channels.roles import format_channel_entry, make_pressure_role
 from drivetwin.channels.shiftlog import Channel, ShiftLog
 from drivetwin.channels.units import BAR
 from drivetwin.findings import Code, Finding, report
 from drivetwin.plausibility.entries import PLAUSIBILITY, Limits, find_entry, get_gain_key
+from drivetwin.shifts.detect import find_gear_spans
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.vehicle.card import VehicleCard
 from drivetwin.vehicle.card_fields import get_card_field
@@ -293,6 +295,8 @@ WINDOW = 0.4
 """Width of the windows of the vehicle balance [s]."""
 CORRELATED = 0.9
 """Least correlation of torque and acceleration."""
+OPPOSED = 0.8
+"""Least correlation of their changes with the wrong sign."""
 
 
 def estimate_engine_inertia(
@@ -354,6 +358,29 @@ def estimate_vehicle_inertia(log: ShiftLog, card: VehicleCard) -> Limits | None:
     at_wheel = card.final_drive.value**2
     low, high = product / covariance[0, 0], covariance[1, 1] / product
     return float(at_wheel * low), float(at_wheel * high)
+
+
+def check_torque_signs(log: ShiftLog, card: VehicleCard) -> Iterator[Finding]:
+    """Report each torque that falls where the vehicle accelerates more, in gear.
+
+    Changes from one half window to the next are compared: a slope of the road changes slowly, a
+    pedal fast.
+    """
+    spans = find_gear_spans(log, card)
+    for role in ("engine_torque", "output_torque"):
+        changes = []
+        for gear, (first, last) in spans if role in log else []:
+            windows = list(pairwise(np.arange(first, last, 0.5 * WINDOW)))
+            ratio = card.compute_ratio(gear) if role == "engine_torque" else 1.0
+            torques = [ratio * compute_mean(log[role], one) for one in windows]
+            rates = [compute_output_rate(log, card, one) for one in windows]
+            changes.append(np.diff([torques, rates]))
+        torque, rate = np.nan_to_num(np.hstack([np.zeros((2, 0)), *changes]))
+        size = float(np.sqrt(np.sum(torque**2) * np.sum(rate**2)))
+        if torque.size >= LEAST_WINDOWS and float(torque @ rate) < -OPPOSED * size:
+            name, correlation = log[role].source_name, float(torque @ rate) / size
+            entry = format_channel_entry(role, name, sign=-1)
+            yield report(Code.TORQUE_REVERSED, channel=name, entry=entry, correlation=correlation)
 
 
 def check_inertias(
