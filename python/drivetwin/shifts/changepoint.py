@@ -16,8 +16,8 @@ _HIGHEST = 3
 """Highest power of the time from the hinge."""
 _FINER = 10
 """Ratio of the steps of two grids [-]."""
-_RESOLUTION = 1e-5
-"""Step of the finest grid of hinges [s]."""
+_RESOLUTION = 1.1e-5
+"""Step at which the grids of hinges end [s]: 10 us, with the rounding of its tenths."""
 
 
 class Moving(Enum):
