@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivetwin.errors import InputError
+from drivetwin.errors import InputError, PlausibilityError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.findings import Code
@@ -406,6 +406,26 @@ def test_refusals_name_the_path_or_the_channel(
 ) -> None:
     with pytest.raises(InputError, match=said):
         fit_network(*case)
+
+
+@pytest.mark.parametrize(
+    "names", [["engine torque"], ["motor torque"], ["engine speed"], ["motor speed", "wheel speed"]]
+)
+def test_channels_of_the_wrong_sign_are_refused(names: list[str]) -> None:
+    """Of several channels those are named that fit the rest: the sign of a whole is free."""
+    made = make_log(ModelName.ENGINE_START)
+    every = {*made.recording.inputs, *made.recording.outputs} - {"K0"}
+    recorded = {
+        table: {
+            name: replace(one, values=-one.values) if name in names else one
+            for name, one in getattr(made.recording, table).items()
+        }
+        for table in ("inputs", "outputs")
+    }
+    with pytest.raises(PlausibilityError, match="with the other sign of") as refusal:
+        fit_network(made.model, [replace(made.recording, **recorded)])
+    named = {name for name in every if name in refusal.value.what}
+    assert named in (set(names), every - set(names))
 
 
 def test_a_recorded_input_takes_the_place_of_that_of_the_model() -> None:

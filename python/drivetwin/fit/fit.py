@@ -5,17 +5,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.errors import IdentificationError, InputError, suggest_spelling
+from drivetwin.channels.roles import Quantity
+from drivetwin.errors import (
+    IdentificationError,
+    InputError,
+    PlausibilityError,
+    suggest_spelling,
+)
 from drivetwin.fit.expression import ResolvedNumbers, add_rows
 from drivetwin.fit.fixed_numbers import list_fixed, make_plain
 from drivetwin.fit.network_model import NetworkModel
-from drivetwin.fit.places import Place
+from drivetwin.fit.places import Place, find_input_quantity
 from drivetwin.fit.plant import NetworkTerm, Plant, Problem
 from drivetwin.fit.recording import Recording, build_network_record
 from drivetwin.fit.result import ModelFit, conclude
@@ -26,6 +32,7 @@ from drivetwin.likelihood.objective import LikelihoodObjective
 from drivetwin.likelihood.output import SignalFit
 from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.likelihood.recorded_data import RecordedData
+from drivetwin.likelihood.search import SEARCH, compute_misfit
 from drivetwin.simulation.element_schema import (
     GROUND,
     find_element_faults,
@@ -85,16 +92,81 @@ def fit_network(model: NetworkModel, recordings: Sequence[Recording], *, seed: i
     ------
     InputError
         With the path of an unknown, or the name of a channel, that is wrong.
+    PlausibilityError
+        With the channels that the simulation follows with the other sign only.
     IdentificationError
         Where no start leads to a minimum.
     """
     problem, point, numbers = build_problem(model, recordings)
+    _refuse_reversed(model, recordings, problem, point)
     plant = problem.terms[0].plant
     set_there = {one.path for one in plant.settings}
     fixed = list_fixed(plant.elements, plant.places, set_there, model.tolerances)
     return conclude(
         model, numbers, search(problem, point, numbers.sought, fixed, model.tolerances, seed)
     )
+
+
+def _refuse_reversed(
+    model: NetworkModel,
+    recordings: Sequence[Recording],
+    problem: Problem,
+    point: ParameterVector,
+) -> None:
+    """Raise PlausibilityError for channels whose other sign brings the simulation near the
+    recordings.
+
+    Channels are reversed at the first guess one after another, while that lowers the misfit.
+    """
+    left, names = list(_list_signed(model, recordings)), list[str]()
+    first = misfit = compute_misfit(problem, point)
+    while left:
+        tries = [_reverse(recordings, {*names, one}) for one in left]
+        misfits = [compute_misfit(*build_problem(model, one)[:2]) for one in tries]
+        best = int(np.argmin(misfits))
+        if not misfits[best] < misfit:
+            break
+        misfit = misfits[best]
+        names.append(left.pop(best))
+    if not first - misfit > math.log(SEARCH.far_ratio) * problem.size / len(model.outputs):
+        return
+    other, start, _ = build_problem(model, _reverse(recordings, names))
+    as_read, turned = minimise(problem, point, rough=True), minimise(other, start, rough=True)
+    far = as_read.normal.cost / problem.size if as_read else np.inf
+    near = turned.normal.cost / problem.size if turned else np.inf
+    if near < min(SEARCH.near_chi2, far / SEARCH.far_ratio):
+        chi2 = f"{near:.3g} of the noise, as recorded {far:.3g}"
+        raise PlausibilityError(
+            f"the simulation follows the recordings with the other sign of {', '.join(names)} "
+            f"only: the mean squared residual is then {chi2}",
+            "set sign = -1 at these channels of the model file, or reverse torque or gear there",
+        )
+
+
+def _list_signed(model: NetworkModel, recordings: Sequence[Recording]) -> Iterator[str]:
+    """List the outputs and the inputs that are no pressure."""
+    yield from model.outputs
+    for name in dict.fromkeys(name for one in recordings for name in one.inputs):
+        if find_input_quantity(name, model.elements) is not Quantity.PRESSURE:
+            yield name
+
+
+def _reverse(recordings: Sequence[Recording], names: Collection[str]) -> list[Recording]:
+    """Return recordings with the other sign of some channels."""
+    return [
+        replace(
+            one,
+            inputs={
+                name: replace(signal, values=-signal.values) if name in names else signal
+                for name, signal in one.inputs.items()
+            },
+            outputs={
+                name: replace(signal, values=-signal.values) if name in names else signal
+                for name, signal in one.outputs.items()
+            },
+        )
+        for one in recordings
+    ]
 
 
 def build_problem(
