@@ -39,7 +39,7 @@ from drivetwin.calibration.polish import require_limits
 from drivetwin.calibration.trial import Difference, Trial, compare_trials, run_trials
 from drivetwin.calibration.twin_task import Request, build_task, choose_start
 from drivetwin.channels.shiftlog import ShiftLog
-from drivetwin.cli.export import parse_gears
+from drivetwin.cli.export import choose_gears
 from drivetwin.cli.input_files import read_twin_log
 from drivetwin.cli.options import REPORT, RESULT, TWIN
 from drivetwin.cli.output import print_line, show_step, write_atomically, write_texts
@@ -237,7 +237,7 @@ def _build_request(
 ) -> tuple[Request, Correction | None]:
     """Build the task from options and files; correct the twin by logs if there are any."""
     given = Requirements(()) if request.limits is None else load_limits(request.limits)
-    gears, logs = parse_gears(request.shift), request.from_logs
+    gears, logs = choose_gears(twin, request.shift), request.from_logs
     usual = CalibrationSettings().scale_effort(request.effort)
     settings = replace(usual, certificate_draws=request.draws)
     task = Request(
@@ -421,15 +421,15 @@ def try_controller(request: Try) -> Outcome:
 
 
 def _run(twin: Twin, trials: TrialFile, request: Try, path: Path) -> list[Trial]:
-
+    gears = choose_gears(twin, request.shift)
     asked = Request(
         **request.select(ShiftOptions),
-        gears=parse_gears(request.shift),
+        gears=gears,
         spread=trials.spread,
         oil=trials.oil.to_friction(),
         policy=PolicyKind.OWN,
     )
-    scenarios = trials.list_scenarios(request.shift, request.draws)
+    scenarios = trials.list_scenarios("-".join(gears), request.draws)
     with compile_controller(path, bench=True) as given, show_step(f"testing {path.name}"):
         timed = replace(given, task=request.task or given.task)
         return run_trials(twin, asked, timed, scenarios)

@@ -17,7 +17,7 @@ from drivetwin.export.targets import Target
 from drivetwin.export.write import ExportedModel, write_content, write_export
 from drivetwin.report.blocks import Outcome, TextBlock
 from drivetwin.report.results import MadeResult, open_result
-from drivetwin.twin.twin import Twin
+from drivetwin.twin.twin import Twin, find_first_shift
 
 
 def export(request: Export) -> Outcome:
@@ -86,7 +86,7 @@ def _describe_model(made: ExportedModel, request: Export, path: Path) -> Outcome
 
 def _load_model(twin: Twin, request: Export) -> ExportedModel:
     """Load the model, and the initial state from the shift of the log if one is given."""
-    gears = None if request.shift is None else parse_gears(request.shift)
+    gears = None if request.shift is None else choose_gears(twin, request.shift)
     if request.log is None:
         return ExportedModel(build_subject(twin, gears), None)
 
@@ -95,8 +95,13 @@ def _load_model(twin: Twin, request: Export) -> ExportedModel:
     return ExportedModel(*found)
 
 
-def parse_gears(text: str) -> tuple[str, str]:
-    """Return the two gears of `--shift`. Raises InputError where it does not name two."""
+def choose_gears(twin: Twin, text: str | None) -> tuple[str, str]:
+    """Return the two gears of `--shift`, by default of the first upshift of a twin.
+
+    Raises InputError where the option does not name two, or the twin has no such shift.
+    """
+    if text is None:
+        return find_first_shift(twin)
     old, dash, new = text.partition("-")
     if not (old and dash and new):
         raise InputError(f"--shift {text!r} does not name two gears", "write it as in --shift 2-3")

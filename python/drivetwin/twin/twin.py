@@ -427,7 +427,7 @@ def build_friction_law(curve: FrictionCurve) -> Stribeck | FrictionTable:
 
 def build_nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
     """The shift between two gears without times, as far as a model needs it."""
-    start, end = gears or _find_first_shift(twin)
+    start, end = gears or find_first_shift(twin)
     elements = twin.get_gear(start).element, twin.get_gear(end).element
     if elements[0] == elements[1]:
         raise InputError(
@@ -439,7 +439,7 @@ def build_nominal_shift(twin: Twin, gears: tuple[str, str] | None) -> Shift:
     return Shift(start, end, *elements, kind, never, never, never, never, 0.0)
 
 
-def _find_first_shift(twin: Twin) -> tuple[str, str]:
+def find_first_shift(twin: Twin) -> tuple[str, str]:
     """First pair of neighbouring gears with a friction curve."""
     for old, new in pairwise(twin.gears):
         held = (twin.gears[old].element, twin.gears[new].element)

@@ -94,7 +94,9 @@ class Observe(
 class CalibrationFiles(TwinInput):
     """Shift, output folder and limits of a calibration."""
 
-    shift: str = option("Shift to calibrate, such as 2-3.", metavar="GEAR-GEAR", default=REQUIRED)
+    shift: str | None = option(
+        "Shift to calibrate, such as 2-3; default: the first upshift.", metavar="GEAR-GEAR"
+    )
     output: Path = output_folder("Folder for the results.", default=REQUIRED)
     limits: Path | None = input_file("Limits and spread (TOML).")
 
@@ -159,8 +161,10 @@ class Try(
     controller on the same draws. Exit code 1 where an assertion of the controller fails.
     """
 
-    shift: str = option("Shift of the scenarios that state none, such as 2-3.",
-                        metavar="GEAR-GEAR", default=REQUIRED)  # fmt: skip
+    shift: str | None = option(
+        "Shift of the scenarios that state none, such as 2-3; default: the first upshift.",
+        metavar="GEAR-GEAR",
+    )
     controller: Path = input_file("Parameter file of your controller in C.", default=REQUIRED)
     against: Path | None = input_file("Parameter file of a second controller, on the same draws.")
     scenarios: Path | None = input_file("Scenarios and assertions (TOML); else those in stock.")
