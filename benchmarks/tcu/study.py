@@ -37,7 +37,8 @@ def study_vehicle(generator: Generator, seed: int, wrong: str = "") -> dict[str,
         result = identify_controller([log], load_controller_card(path))
     seconds = time.process_time() - begin
     found = result.found
-    pressures = {name: find_used_pressure(found, name) for name in list_used(found.shifts)}
+    used = list_used(found.shifts)
+    pressures = {name: find_used_pressure(found.card, found.shifts, name) for name in used}
     known = list_truth(generator, truth, found.shifts, pressures)
     numbers = [
         {

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from drivetwin.cli import main
-from drivetwin.errors import NoShiftError, PlausibilityError
+from drivetwin.errors import MappingError, NoShiftError, PlausibilityError
 from drivetwin.tcu.card import load_controller_card
 from drivetwin.tcu.log import REFERENCE_OIL, ControllerLog, read_controller_log
+from drivetwin.tcu.outcome import identify_controller
 from drivetwin.tcu.statements import find_onset
 
 
@@ -67,6 +68,34 @@ def test_commands_in_another_unit_are_refused_with_the_unit_that_fits(tmp_path: 
     with pytest.raises(PlausibilityError, match="above 100") as refusal:
         _load(path)
     assert 'unit = "hPa"' in refusal.value.remedy
+
+
+def test_a_command_in_too_small_a_unit_is_refused_before_the_fit(tmp_path: Path) -> None:
+    path = _write(tmp_path)
+    path.write_text(path.read_text("utf-8").replace("mbar", "Pa"), "utf-8")
+    card = load_controller_card(path.with_suffix(".card.toml"))
+    with pytest.raises(PlausibilityError, match=r"K1 applies at 0\.\d+ bar, where the card"):
+        identify_controller([path], card)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("n_turbine", "n_output"), ("n_engine", "n_turbine"), ("n_engine", "n_output")],
+)
+def test_swapped_speeds_are_refused_with_the_columns_that_fit(
+    tmp_path: Path, first: str, second: str
+) -> None:
+    path = _write(tmp_path)
+    names, rest = path.read_text("utf-8").split("\n", 1)
+    swapped = {first: second, second: first}
+    head = ",".join(swapped.get(name, name) for name in names.split(","))
+    path.write_text(f"{head}\n{rest}", "utf-8")
+    with pytest.raises(MappingError, match="speeds are swapped") as refusal:
+        _load(path)
+    roles = {"n_engine": "engine_speed", "n_turbine": "input_speed", "n_output": "output_speed"}
+    for name, role in roles.items():
+        line = f'channels.{role} = {{ source = "{swapped.get(name, name)}" }}'
+        assert line in refusal.value.remedy
 
 
 @pytest.mark.parametrize("end", [1.7, 1e9])

@@ -16,6 +16,7 @@ from drivetwin.likelihood.point import ParameterVector
 from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.log import ControllerShift
 from drivetwin.tcu.problem import (
+    FLOOR,
     LOOSE,
     Coordinates,
     RowNoise,
@@ -88,16 +89,24 @@ class FittedShifts:
 def fit_shifts(card: ControllerCard, shifts: Sequence[ControllerShift]) -> FittedShifts:
     """Fit the numbers of vehicle and clutches to shifts: loose first, then by the residuals.
 
-    The search starts with the first shift of each kind, in which all shared numbers act.
+    The search starts with the first shift of each kind, in which all shared numbers act. It ends
+    with these where they leave more than the intervals include: others would be met no better.
 
     Raises IdentificationError where the simulation cannot be brought onto the log.
     """
     problem, point, coordinates = build_problem(card, shifts)
     first = {one.kind: k for k, one in reversed(list(enumerate(shifts)))}
-    for some in ([problem.terms[k] for k in first.values()], problem.terms):
-        problem = weigh(replace(problem, terms=tuple(some)), LOOSE.shared, point)
-        found = _require(minimise(problem, point, rough=True, settings=_LOOSE))
-        point = found.point
+    sizes: Mapping[Own, float] = {}
+    for some in (list(first.values()), range(len(shifts))):
+        terms = tuple(problem.terms[k] for k in some)
+        start = weigh(replace(problem, terms=terms), LOOSE.shared, point)
+        found = _require(minimise(start, point, rough=True, settings=_LOOSE))
+        point, noise = found.point, estimate_noise(found.problem, found.point)
+        if max(noise.sigma.values()) > FLOOR:
+            fitted = tuple(shifts[k] for k in some)
+            return FittedShifts(
+                card, fitted, found.problem, coordinates, point, _invert(found), noise, sizes
+            )
     for turn in range(_ROUNDS):
         point = found.point
         noise = estimate_noise(found.problem, point)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -113,7 +114,11 @@ def read_controller_log(
     for role, (stamps, values) in raw.items():
         at = np.clip(np.searchsorted(stamps, time, side="right") - 1, 0, None)
         held[role] = values[at]
-    return _cut_shifts(str(path), card, time, held)
+    log = _cut_shifts(str(path), card, time, held)
+    _require_ratios(
+        card, log.shifts, [specs[role].source for role in SPEEDS], Where(file=str(path))
+    )
+    return log
 
 
 def _load(
@@ -203,6 +208,38 @@ def _cut_shifts(
             Where(file=source),
         )
     return ControllerLog(source, tuple(shifts), tuple(left_out))
+
+
+def _require_ratios(
+    card: ControllerCard, shifts: Sequence[ControllerShift], columns: Sequence[str], where: Where
+) -> None:
+    """Raise MappingError where other `columns` of speeds than those of turbine and output have the
+    ratios of the gears: two are swapped."""
+    apart = {}
+    for pair in permutations(range(len(SPEEDS)), 2):
+        parts = []
+        for one in shifts:
+            first, second = one.speeds[one.time < one.change][:, pair].T
+            with np.errstate(divide="ignore", invalid="ignore"):
+                parts.append(np.median(np.abs(first / second / card.ratios[one.gears[0]] - 1.0)))
+        apart[pair] = 100.0 * float(np.median(parts))
+    best = min(apart, key=lambda pair: apart[pair])
+    if apart[1, 2] < _SAME_RATIO or not apart[best] < _SAME_RATIO:
+        return
+    stated, fitting = (" over ".join(repr(columns[k]) for k in pair) for pair in ((1, 2), best))
+    pairs = zip(SPEEDS, (len(SPEEDS) - sum(best), *best), strict=True)
+    lines = [f'channels.{role} = {{ source = "{columns[k]}" }}' for role, k in pairs]
+    raise MappingError(
+        f"speeds are swapped: {stated} is off the ratios of the gears by {apart[1, 2]:.1f} %, "
+        f"{fitting} by {apart[best]:.1f} %",
+        f"name the columns in the channel mapping, {', '.join(lines)}",
+        where,
+    )
+
+
+_SAME_RATIO = 1.0
+"""Error of a ratio that unlike ages and windows of the speeds explain; a converter slips more
+[%]."""
 
 
 def _parse_gear(name: str) -> float:

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtr
 
+from drivetwin.channels.roles import make_command_role
 from drivetwin.channels.units import RPM
-from drivetwin.errors import IdentificationError, InputError, Where
+from drivetwin.errors import IdentificationError, InputError, PlausibilityError, Where
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.method import ModelStatus
 from drivetwin.estimation.result.verdict import reject_identified
@@ -20,7 +21,8 @@ from drivetwin.tcu.identify import FittedShifts, TcuTwin, fit_shifts
 from drivetwin.tcu.log import SPEEDS, ControllerLog, ControllerShift, read_controller_log
 from drivetwin.tcu.predict import PredictedShift, predict_shift
 from drivetwin.tcu.problem import FLOOR
-from drivetwin.tcu.statements import state
+from drivetwin.tcu.statements import find_used_pressure, list_used, state
+from drivetwin.tcu.unknowns import Numbers, list_element
 
 _EVERY = 5
 """One shift of so many is held out where none is named."""
@@ -81,7 +83,8 @@ def identify_controller(
     Raises
     ------
     InputError
-        For a shift that does not exist, and where too few are left to fit.
+        For a shift that does not exist, where too few are left to fit, and for a command in another
+        unit.
     IdentificationError
         Where the simulation cannot be brought onto the shifts.
     """
@@ -96,6 +99,7 @@ def identify_controller(
             f"record at least {_LEAST_SHIFTS}; 15 to 20 of every kind of interest are usual",
             Where(file=logs[0].source),
         )
+    _require_pressures(card, shifts, logs[0].source)
     found = fit_shifts(card, fitted)
     predictions = predict(found.twin, [one for one in shifts if one.number in held], seed)
     status, reason = _judge(found, predictions)
@@ -105,6 +109,31 @@ def identify_controller(
     elif status is not ModelStatus.VALID:
         estimates = {name: reject_identified(one, reason) for name, one in estimates.items()}
     return TcuIdentification(logs, found, estimates, predictions, status, reason)
+
+
+def _require_pressures(card: ControllerCard, shifts: Sequence[ControllerShift], log: str) -> None:
+    """Raise PlausibilityError for a command at which an element slips as it applies, but whose
+    torque by the card is another than that of the engine: it is in another unit."""
+    for name in list_used(shifts):
+        applied = [one for one in shifts if one.on == name]
+        stated = list_element(card.gains[name])
+        torques = [
+            abs(np.median(one.torque)) / card.levers[frozenset(one.gears)][name] for one in applied
+        ]
+        needed = stated[Numbers.P0].value + np.median(torques or 0.0) / card.gains[name].value
+        used = find_used_pressure(card, applied, name) if applied else needed
+        if not 1.0 / _OTHER_UNIT < used / needed < _OTHER_UNIT:
+            raise PlausibilityError(
+                f"{name} applies at {used:g} bar, where the card and the engine torque need about "
+                f"{needed:.1f} bar",
+                "correct the unit of the command, or the gain on the card",
+                Where(file=log, channel=make_command_role(name)),
+            )
+
+
+_OTHER_UNIT = 10.0
+"""Ratio of pressures that control, converter and scatter do not explain: those of commands are
+between 0.9 and 7 times the needed ones [ratio]."""
 
 
 def predict(

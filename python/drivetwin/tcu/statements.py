@@ -15,6 +15,7 @@ from drivetwin._util.arrays import FloatArray
 from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.estimation.result.verdict import assess_with_prior
 from drivetwin.parameters import ParameterSpec
+from drivetwin.tcu.card import ControllerCard
 from drivetwin.tcu.identify import FittedShifts
 from drivetwin.tcu.log import REFERENCE_OIL, ControllerShift
 from drivetwin.tcu.predict import find_slip
@@ -85,7 +86,7 @@ def state(found: FittedShifts) -> dict[str, Estimate]:
     return estimates
 
 
-def list_used(shifts: tuple[ControllerShift, ...]) -> list[str]:
+def list_used(shifts: Sequence[ControllerShift]) -> list[str]:
     """List the elements that change in shifts."""
     return sorted({name for one in shifts for name in (one.off, one.on)})
 
@@ -137,7 +138,7 @@ def _list_vehicle() -> Iterator[Statement]:
 def _list_elements(found: FittedShifts) -> Iterator[Statement]:
     """List the quantities of each element that changes in the shifts."""
     for name in list_used(found.shifts):
-        at = find_used_pressure(found, name)
+        at = find_used_pressure(found.card, found.shifts, name)
         torque = partial(compute_capacity, element=name, pressure=at)
         yield Statement(
             f"{name}.P0",
@@ -172,14 +173,16 @@ def _list_elements(found: FittedShifts) -> Iterator[Statement]:
             )
 
 
-def find_used_pressure(found: FittedShifts, element: str) -> float:
+def find_used_pressure(
+    card: ControllerCard, shifts: Sequence[ControllerShift], element: str
+) -> float:
     """Find the median command [bar] of an element where the log shows its torque: while it slips
     as it applies, and before the slip begins as it releases."""
     parts = []
-    for one in found.shifts:
+    for one in shifts:
         if element not in (one.off, one.on):
             continue
-        slip = find_slip(found.card, one, one.time, one.speeds[:, 1], one.speeds[:, 2])
+        slip = find_slip(card, one, one.time, one.speeds[:, 1], one.speeds[:, 2])
         span = (slip.start, slip.end) if element == one.on else (one.change, slip.start)
         rows = (one.time >= span[0]) & (one.time <= span[1])
         parts.append(one.commands[element][rows & (one.commands[element] > 0.0)])

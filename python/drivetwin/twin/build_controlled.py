@@ -52,7 +52,7 @@ def build_shift_twin(found: FittedShifts, kind: str) -> Twin:
     """Build the twin of the shifts of a `kind`, such as 2-3, among the fitted ones."""
     shifts = [one for one in found.shifts if one.kind == kind]
     first, card, slopes = shifts[0], found.card, Slopes.from_fit(found)
-    used = {name: find_used_pressure(found, name) for name in (first.off, first.on)}
+    used = {name: find_used_pressure(card, found.shifts, name) for name in (first.off, first.on)}
     quantities = _list_parameters(found, shifts)
     laws = {
         make_law_id(name, key): one
