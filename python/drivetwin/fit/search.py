@@ -99,10 +99,11 @@ def search(
         attempts = _refine_guess(problem, guess)
         if fixed and not _is_noise(attempts):
             # Wrong fixed numbers lead the unknowns astray: all are sought from the first guess.
-            moved = tuple(fixed)
-            problem, point = extend(problem, start, moved)
-            guess = replace(guess, point=point)
-            attempts = _refine_guess(problem, guess)
+            wide, point = extend(problem, start, fixed)
+            beside = replace(guess, point=point)
+            other = _refine_guess(wide, beside)
+            if _is_noise(other):
+                problem, guess, attempts, moved = wide, beside, other, tuple(fixed)
         found = _seek(problem, guess, attempts)
     with scale_progress(0.58, 1.0):
         first, found = found, _lower_estimates(found)
