@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +39,6 @@ from drivetwin.bus.scatter import (
     make_estimate,
     refuse,
 )
-from drivetwin.bus.torque import TorqueBalance
 from drivetwin.bus.torque_estimates import estimate_torques, find_dead_time
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import NoShiftError, Where
@@ -76,7 +75,6 @@ class BusIdentification:
     timelines: tuple[Timeline, ...]
     decays: dict[str, JointDecay]
     predictions: dict[str, DecayPrediction]
-    balances: dict[str, TorqueBalance] = field(default_factory=dict)
     loads: tuple[RoadLoad, ...] = ()
     findings: tuple[Finding, ...] = ()
 
@@ -122,10 +120,9 @@ def identify_bus(
     dead, dead_std = find_dead_time(timelines, ratios, late, made.decays) or (None, 0.0)
     if dead is not None:  # the torque drives the oscillation of the decays too
         made.add_decays(_collect_decays(timelines, ratios, dead), dead_std)
-    torques = estimate_torques(timelines, ratios, late, made.decays, card)
+    by_torque, loads = estimate_torques(timelines, ratios, late, made.decays, card)
     made.report_decays()
-    made.estimates |= torques.estimates
-    made.findings += torques.findings
+    made.estimates |= by_torque
     for name in _BEYOND_METER:
         made.estimates[name] = refuse(name, "", explain(Code.BUS_NO_METER))
     made.findings += [one for line in timelines for one in find_limits(line)]
@@ -140,8 +137,7 @@ def identify_bus(
         tuple(timelines),
         made.decays,
         predictions,
-        torques.balances,
-        torques.loads,
+        loads,
         tuple(made.findings),
     )
 

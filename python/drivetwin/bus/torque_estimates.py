@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,18 +34,8 @@ from drivetwin.bus.torque import (
 )
 from drivetwin.estimation.result.estimate import Z95, Estimate
 from drivetwin.estimation.result.verdict import VERDICT
-from drivetwin.findings import Code, Finding, Number, explain
+from drivetwin.findings import Code, Number, explain
 from drivetwin.vehicle.card import RatioCard
-
-
-@dataclass(frozen=True, eq=False)
-class TorqueResults:
-    """Estimates by id; `balances` by gear, the open clutch under an empty name; road loads."""
-
-    estimates: dict[str, Estimate] = field(default_factory=dict)
-    balances: dict[str, TorqueBalance] = field(default_factory=dict)
-    loads: tuple[RoadLoad, ...] = ()
-    findings: tuple[Finding, ...] = ()
 
 
 def find_dead_time(
@@ -79,12 +68,15 @@ def estimate_torques(
     late: Mapping[str, float],
     decays: Mapping[str, JointDecay],
     card: RatioCard | None,
-) -> TorqueResults:
-    """Estimate all that the engine torque determines; without one, each has its reason."""
+) -> tuple[dict[str, Estimate], tuple[RoadLoad, ...]]:
+    """Estimate all that the engine torque determines, by id, and the road loads by span.
+
+    Without an engine torque each estimate has its reason.
+    """
     if not any("engine_torque" in line.log.signals for line in lines):
         converter = any(line.log.converter for line in lines)
         reason = explain(Code.BUS_TORQUE_OF_CONVERTER if converter else Code.BUS_NO_TORQUE)
-        return TorqueResults({make_id(one): refuse(one, "", reason) for one in _ALL})
+        return {make_id(one): refuse(one, "", reason) for one in _ALL}, ()
     estimates: dict[str, Estimate] = {}
     balances: dict[str, TorqueBalance] = {}
     open_spans = _list_open(lines, late.get("engine_speed", 0.0))
@@ -107,7 +99,7 @@ def estimate_torques(
     loads = estimate_loads(held, balances, alone)
     _add_load(estimates, loads)
     _add_dead_time(estimates, balances)
-    return TorqueResults(estimates, balances, loads)
+    return estimates, loads
 
 
 def _add(estimates: dict[str, Estimate], one: Estimate) -> None:

@@ -52,10 +52,6 @@ class TcuTwin:
     kinds: tuple[str, ...]
     sizes: Mapping[Own, float]
 
-    def get_place(self, name: str) -> int:
-        """Return the place of a shared number."""
-        return self.names.index(name)
-
 
 @dataclass(frozen=True, eq=False)
 class FittedShifts:

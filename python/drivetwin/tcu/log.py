@@ -33,7 +33,7 @@ from drivetwin.tcu.card import ControllerCard
 
 SPEEDS = ("engine_speed", "input_speed", "output_speed")
 """Roles of the compared speeds: engine, turbine, output."""
-_GEAR, _TARGET, _OIL = "gear", "requested_gear", "temperature.oil"
+_TARGET, _OIL = "requested_gear", "temperature.oil"
 _GAP = 0.5
 """Time between two rows from which they belong to different recordings [s]."""
 _BEFORE, _AFTER = 2.0, 3.0
@@ -155,7 +155,7 @@ def _find_columns(
     commands = [make_command_role(name) for name in sorted(used)]
     needed = [*FOR_CONTROL, *commands]
     found = {}
-    for role in [*needed, _GEAR, _OIL, make_command_role(card.lockup)]:
+    for role in [*needed, _OIL, make_command_role(card.lockup)]:
         if role in stated:
             found[role] = stated[role]
             continue

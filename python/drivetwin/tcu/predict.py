@@ -88,11 +88,12 @@ def predict_shift(
     problem, point, _ = build_problem(twin.card, [shift], twin.sizes)
     shared = [name for name in point.names if name in set(twin.names)]
     places = [point.names.index(name) for name in shared]
-    fitted = [twin.get_place(name) for name in shared]
+    fitted = [twin.names.index(name) for name in shared]
     values = point.values.copy()
     values[places] = twin.values[fitted]
     covariance = _join_covariance(twin, problem, places, fitted)
-    problem, point = _hold(problem, point.replace_values(values), covariance, places)
+    point = point.replace_values(values)
+    problem = _hold(problem, point, covariance, places)
     before = _cut(problem, shift, twin)
     start = minimise(before, point, settings=_SEARCH)
     if start is None:
@@ -133,14 +134,14 @@ def _join_covariance(
 
 def _hold(
     problem: Problem, point: ParameterVector, covariance: FloatArray, places: list[int]
-) -> tuple[Problem, ParameterVector]:
+) -> Problem:
     """Hold the numbers of the fit at their values."""
     mean, precision = problem.prior.mean.copy(), problem.prior.precision.copy()
     mean[places] = point.values[places]
     precision[places, :] = precision[:, places] = 0.0
     spread = np.sqrt(np.diag(covariance)[places])
     precision[places, places] = (_HELD * spread) ** -2.0
-    return replace(problem, prior=Prior(mean, precision)), point
+    return replace(problem, prior=Prior(mean, precision))
 
 
 def _cut(problem: Problem, shift: ControllerShift, twin: TcuTwin) -> Problem:

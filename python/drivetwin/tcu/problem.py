@@ -10,8 +10,7 @@ import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.channels.units import RPM
-from drivetwin.fit.plant import NetworkTerm, Problem
-from drivetwin.fit.unknown import SoughtNumber
+from drivetwin.fit.plant import Problem
 from drivetwin.likelihood.measured_signal import count_repeats
 from drivetwin.likelihood.point import ParameterVector, Prior
 from drivetwin.likelihood.residual_covariance import build_sensor_whitener
@@ -32,7 +31,6 @@ class Coordinates:
     with the scale.
     """
 
-    numbers: tuple[SoughtNumber, ...]
     stated: Mapping[str, Stated]
     names: tuple[str, ...]
     mean: FloatArray
@@ -99,7 +97,7 @@ def build_problem(
     to_absolute = np.eye(len(names))
     grows = [k for k, name in enumerate(names) if stated[name].scaled and stated[name].is_positive]
     to_absolute[grows, names.index(J_VEHICLE)] = 1.0
-    coordinates = Coordinates(tuple(numbers.values()), stated, names, mean, spread, to_absolute)
+    coordinates = Coordinates(stated, names, mean, spread, to_absolute)
     coordinates = coordinates.resize(sizes or {})
     limits = [(-np.inf, np.inf) if one is None else one.limits for one in sought]
     lower, upper = np.array(limits).T
@@ -149,19 +147,15 @@ def weigh(
 
     About a `point`, rows beyond 3 deviations weigh less, so that their influence is bounded.
     """
-    terms = tuple(_weigh_rows(one, sigma, point) for one in problem.terms)
-    return replace(problem, terms=terms)
-
-
-def _weigh_rows(
-    term: NetworkTerm, sigma: Mapping[str, float], point: ParameterVector | None
-) -> NetworkTerm:
-    outputs = term.record.outputs
-    every = np.concatenate([np.full(one.values.size, sigma[one.name]) for one in outputs])
-    residual = None if point is None else term.evaluate(point)
-    if residual is not None:
-        every = every * np.sqrt(np.maximum(np.abs(residual) / (_FAR * every), 1.0))
-    return replace(term, weighting=build_sensor_whitener(every))
+    terms = []
+    for term in problem.terms:
+        outputs = term.record.outputs
+        every = np.concatenate([np.full(one.values.size, sigma[one.name]) for one in outputs])
+        residual = None if point is None else term.evaluate(point)
+        if residual is not None:
+            every *= np.sqrt(np.maximum(np.abs(residual) / (_FAR * every), 1.0))
+        terms.append(replace(term, weighting=build_sensor_whitener(every)))
+    return replace(problem, terms=tuple(terms))
 
 
 def estimate_noise(problem: Problem, point: ParameterVector) -> RowNoise:
