@@ -28,6 +28,8 @@ from drivetwin.tcu.problem import (
 from drivetwin.tcu.unknowns import Own
 
 _LOOSE = GaussNewtonSettings(rough_max_iter=10, rough_rtol=1e-2)
+_SEARCHES = 2
+"""Loose searches over the same shifts, of which one that went on falling is the first [count]."""
 _TIGHT = GaussNewtonSettings(ftol=0.1, kink_ftol=1.0, max_iter=8)
 """Search near the minimum: a decrease of Q by 0.1 is a third of a standard deviation."""
 _ROUNDS = 2
@@ -93,13 +95,17 @@ def fit_shifts(card: ControllerCard, shifts: Sequence[ControllerShift]) -> Fitte
     problem, point, coordinates = build_problem(card, shifts)
     first = {one.kind: k for k, one in reversed(list(enumerate(shifts)))}
     sizes: Mapping[Own, float] = {}
-    for some in (list(first.values()), range(len(shifts))):
-        terms = tuple(problem.terms[k] for k in some)
+    stages, searches = [list(first.values()), list(range(len(shifts)))], 0
+    while stages:
+        terms = tuple(problem.terms[k] for k in stages[0])
         start = weigh(replace(problem, terms=terms), LOOSE.shared, point)
         found = _require(minimise(start, point, rough=True, settings=_LOOSE))
         point, noise = found.point, estimate_noise(found.problem, found.point)
-        if max(noise.sigma.values()) > FLOOR:
-            fitted = tuple(shifts[k] for k in some)
+        searches += 1
+        if max(noise.sigma.values()) <= FLOOR:
+            stages, searches = stages[1:], 0
+        elif found.converged or searches == _SEARCHES:
+            fitted = tuple(shifts[k] for k in stages[0])
             return FittedShifts(
                 card, fitted, found.problem, coordinates, point, _invert(found), noise, sizes
             )
