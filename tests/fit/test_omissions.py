@@ -37,10 +37,10 @@ def list_shown(found: ModelFit) -> list[str]:
     return [one.subject for one in found.findings if one.code is Code.OMISSION_SHOWN]
 
 
-def read_early(recording: Recording, name: str) -> Recording:
+def read_early(recording: Recording, name: str, late: float = LATE) -> Recording:
     """Return a recording with an input read earlier than it acts."""
     one = recording.inputs[name]
-    early = replace(one, values=np.interp(one.time + LATE, one.time, one.values))
+    early = replace(one, values=np.interp(one.time + late, one.time, one.values))
     return replace(recording, inputs={**recording.inputs, name: early})
 
 
@@ -64,6 +64,17 @@ def test_the_delay_of_a_pressure_is_found_and_acts_in_predictions() -> None:
     assert moved.value == pytest.approx(LATE, abs=3.5 * moved.std)
     require_truth(found, dict(made.truth))
     assert predict(found, [late])[0].chi2 == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("late", [0.06, -0.06])
+def test_a_far_delay_of_a_pressure_is_no_other_fill_pressure(late: float) -> None:
+    made = make_log(ModelName.ENGINE_START)
+    model = replace(made.model, unknowns={**made.model.unknowns, "K0.p0": Unknown(8e4, 2e4)})
+    found = fit_network(model, [read_early(made.recording, "K0", late)])
+    assert list_shown(found) == ["delay.K0"]
+    (moved,) = (one for one in found.moved if one.number.name == "delay.K0")
+    assert moved.value == pytest.approx(late, abs=3.5 * moved.std)
+    require_truth(found, {**made.truth, "K0.p0": 8e4})
 
 
 def test_a_delay_that_is_stated_as_exact_is_not_sought() -> None:

@@ -13,7 +13,7 @@ was put into the model where that was chosen.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -49,6 +49,8 @@ class OmissionSettings:
     """Usual delay of a pressure: line and valve [s]."""
     torque_delay: float = 0.02
     """Usual delay of an engine torque: calculation and bus [s]."""
+    far_delay: float = 0.05
+    """Delay of a pressure at which a search for a far one starts, to either side [s]."""
     longest_delay: float = 0.2
     """Longest delay of an input [s]."""
     play_share: float = 0.2
@@ -129,9 +131,11 @@ def complete_model(found: OptimizeResult[Problem], stated: Collection[str]) -> C
     """
     found = _extend_inputs(found)
     candidates = _list_omissions(found, stated)
-    begin = _Completion(found, candidates, _list_plays(found), _weigh_all(found, candidates))
+    tries = [*_list_plays(found), *_list_far_delays(found, candidates)]
+    begin = _Completion(found, candidates, tries, _weigh_all(found, candidates))
     done = begin
-    with suppress(BudgetExceeded), limit_evaluations(MAX_REFIT_WORK):
+    work = MAX_REFIT_WORK * max(len(tries), 1)
+    with suppress(BudgetExceeded), limit_evaluations(work):
         while len(done.shown) < OMISSIONS.most and (more := _admit_best(done)) is not None:
             done = more
     if done.shown and done.found.normal.cost > EXPLAINED * done.found.problem.size:
@@ -156,7 +160,7 @@ class _Completion:
 
     found: OptimizeResult[Problem]
     candidates: Sequence[Omission]
-    plays: Sequence[Omission]
+    tries: Sequence[Omission]
     weighed: Sequence[_Weighed]
     shown: tuple[ShownOmission, ...] = ()
     apart: tuple[_Rival, ...] = ()
@@ -166,17 +170,18 @@ def _admit_best(done: _Completion) -> _Completion | None:
     """Minimise with the omission that has most evidence; None where none has enough."""
     found, candidates = done.found, done.candidates
     best = max(done.weighed, key=lambda one: one.nats, default=None)
-    played = [] if is_explained(found) else [_put_play(found, one) for one in done.plays]
-    plays = [one.omission for one in played if one.result is not None]
-    play = max(played, key=lambda one: one.nats, default=None)
+    tried = [] if is_explained(found) else [_try(found, one) for one in done.tries]
+    tries = [one.omission for one in tried if one.result is not None]
+    far = max(tried, key=lambda one: one.nats, default=None)
     rivals: list[_Rival] = []
-    if best is not None and best.weight >= 1.0 and (play is None or best.nats > play.nats):
+    if best is not None and best.weight >= 1.0 and (far is None or best.nats > far.nats):
         candidates = [one for one in candidates if one is not best.omission]
         nats, better = best.nats, _put_into_model(found, best)
         rivals = _list_rivals(best, done.weighed)
-    elif play is not None and play.result is not None:
-        plays = [one for one in plays if one is not play.omission]
-        nats, better = play.nats, play.result
+    elif far is not None and far.result is not None:
+        candidates = [one for one in candidates if one.path != far.omission.path]
+        tries = [one for one in tries if one is not far.omission]
+        nats, better = far.nats, far.result
     else:
         return None
     shown, apart = done.shown, done.apart
@@ -185,7 +190,7 @@ def _admit_best(done: _Completion) -> _Completion | None:
         names = tuple(one.name for one in rivals if one.share > OMISSIONS.odds)
         shown += (ShownOmission(found.problem.terms[0].plant.fixed[-1], nats, names),)
         apart += tuple(rivals)
-    return _Completion(found, candidates, plays, _weigh_all(found, candidates), shown, apart)
+    return _Completion(found, candidates, tries, _weigh_all(found, candidates), shown, apart)
 
 
 def _extend_inputs(found: OptimizeResult[Problem]) -> OptimizeResult[Problem]:
@@ -268,6 +273,20 @@ def _list_plays(found: OptimizeResult[Problem]) -> list[Omission]:
             play = {**stated, "type": "backlash", "gap": gap}
             plays.append(Omission(f"play of {name}", f"{name}.gap", gap, play))
     return plays
+
+
+def _list_far_delays(
+    found: OptimizeResult[Problem], candidates: Sequence[Omission]
+) -> Iterator[Omission]:
+    """List delays of pressures beyond the reach of an expansion.
+
+    They act like another fill pressure, which the minimum without them has.
+    """
+    elements = found.problem.terms[0].plant.elements
+    for one in candidates:
+        field, _, name = one.path.partition(".")
+        if field == "delay" and find_input_quantity(name, elements) is Quantity.PRESSURE:
+            yield replace(one, size=OMISSIONS.far_delay)
 
 
 _NO_LOAD = {"constant": 0.0, "rolling": 0.0, "aero": 0.0}
@@ -403,26 +422,30 @@ def _weigh(one: Omission, own: float, pull: float, moves: FloatArray) -> _Weighe
 
 
 @dataclass(frozen=True, eq=False)
-class _Played:
-    """Play with its log evidence, and the minimum with it; None where it is not shown."""
+class _Tried:
+    """Omission with its log evidence, and the minimum with it; None where it is not shown."""
 
     omission: Omission
     nats: float
     result: OptimizeResult[Problem] | None
 
 
-def _put_play(found: OptimizeResult[Problem], play: Omission) -> _Played:
-    """Minimise with a play."""
-    problem, point = _admit(found, [play])
-    first = minimise(problem, point)
+def _try(found: OptimizeResult[Problem], one: Omission) -> _Tried:
+    """Minimise with an omission whose evidence no expansion gives: a play, a far delay."""
+    problem, point = _admit(found, [one])
+    amounts = (0.0,) if one.element is not None else (1.0, -1.0)
+    along = np.eye(point.values.size)[-1]
+    starts = [point.replace_values(point.values + amount * along) for amount in amounts]
+    ends = [minimise(problem, start, rough=len(starts) > 1) for start in starts]
+    first = min(filter(None, ends), key=lambda end: end.normal.cost, default=None)
     if first is None:
-        return _Played(play, 0.0, None)
+        return _Tried(one, 0.0, None)
     counted = max(first.normal.cost / problem.size, 1.0)
     nats = 0.5 * (found.normal.cost - first.normal.cost) / counted - OMISSIONS.occam
     if OMISSIONS.odds * math.exp(min(nats, 700.0)) < 1.0:
-        return _Played(play, nats, None)
+        return _Tried(one, nats, None)
     again = first.problem.update_weighting(first.point)
-    return _Played(play, nats, minimise(again, first.point))
+    return _Tried(one, nats, minimise(again, first.point))
 
 
 def is_explained(found: OptimizeResult[Problem]) -> bool:
