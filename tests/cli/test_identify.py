@@ -169,3 +169,18 @@ def test_strict_passes_a_confirmed_model_only(
     assert main([*arguments, "--strict"]) == expected
     assert main([*arguments, "--together", "--strict"]) == expected
     assert main(arguments) == 0
+
+
+def test_a_log_without_a_shift_is_refused_with_the_faults_of_its_channels(
+    bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The saturated input speed, not the ratios, is why no gear is held before the shift."""
+    names, units, *rows = (line.split(",") for line in bench_files.log.read_text().splitlines())
+    place = names.index("SpdIn")
+    for row in rows:
+        row[place] = str(min(float(row[place]), 1600.0))
+    log = tmp_path / "saturated.csv"
+    log.write_text("\n".join(map(",".join, (names, units, *rows))), "utf-8")
+    assert main(["identify", str(log), "--vehicle", str(bench_files.card)]) == 2
+    shown = capsys.readouterr().err
+    assert shown.index("channel 'SpdIn': Saturated") < shown.index("no usable gear shift")

@@ -85,6 +85,8 @@ def run_identification(
                 reads.append(read_shifts(path, how, card))
     show_findings(dict.fromkeys(one for _, _, doubts in reads for one in doubts))
     for log, each, _ in reads:
+        if not each.shifts:
+            show_findings(log.findings)  # A saturated speed holds no gear.
         refuse_without_shifts(log, card, each)
     held = parse_holdouts(wanted, logs, [each for _, each, _ in reads])
     sources = [Source(log, each, part) for (log, each, _), part in zip(reads, held, strict=True)]

@@ -129,7 +129,12 @@ def test_a_pressure_of_zero_throughout_is_an_open_element() -> None:
     [
         ("pressure.B2", 14e5 * 1e5, "bar", "'Pa'"),  # Pa taken as bar
         ("pressure.B2", 1400e5, "bar", 'unit = "kPa"'),  # before hPa, of which 1.4 bar would follow
-        ("pressure.B2", 14.0, "Pa", "'bar'"),  # bar taken as Pa
+        (
+            "pressure.B2",
+            14.0,
+            "Pa",
+            'unit = "bar"',
+        ),  # before kgf/cm², of which 13.7 bar would follow
         ("pressure.B2", 1400e5, "bar", "'kPa'"),
         ("pressure.B2", 200e5, "bar", "'psi'"),
         ("input_speed", 1800.0, "rad/s", "'rpm'"),

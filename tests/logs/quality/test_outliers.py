@@ -58,6 +58,14 @@ def test_spikes_are_found_to_the_sample(width: int, height: float) -> None:
     assert any("3 spikes left out, " in text for text in render(found.findings))
 
 
+def test_the_code_of_spikes_is_left_out_beside_another() -> None:
+    values = torque()
+    runs = [(k, k + 1) for k in (300, 800, 1300, 1308, 1500, 1502)]
+    for start, stop in runs:
+        values[start:stop] = -6000.0  # not far beyond the largest torque
+    assert check("output_torque", values, time=TIME).left_out == runs
+
+
 @pytest.mark.parametrize(("height", "width"), [(3000.0, 4), (-700.0, 12)])
 def test_a_torque_that_jumps_and_jumps_back_is_found(height: float, width: int) -> None:
     values = torque()

@@ -117,7 +117,7 @@ _TYPICAL: dict[Quantity, tuple[float, float]] = {
     Quantity.FRACTION: (0.05, 1.0),
 }
 """Typical range of max|value|; units that bring the values into it are proposed, first the one that
-brings them nearest to its middle."""
+brings them nearest to its middle by powers of ten."""
 
 _MUST_VARY = frozenset(
     ("output_torque", "input_speed", "engine_speed", "output_speed", "wheel_speed")
@@ -435,11 +435,11 @@ def check_magnitude(
         return
     low, high = _TYPICAL[quantity]
     fitting = {
-        name: abs(np.log(factor * largest / np.sqrt(low * high)))
+        name: abs(np.log10(factor * largest / np.sqrt(low * high)))
         for name, factor in list_usual_units(quantity, unit)
         if low <= factor * largest <= high
     }
-    units = sorted(fitting, key=fitting.__getitem__)
+    units = sorted(fitting, key=lambda name: round(fitting[name]))  # of equal size the usual one
     side, limit = ("above", highest) if largest > highest else ("below", lowest)
     remedy = (
         f"the numbers would fit {' or '.join(map(repr, units))}: assert the unit in the channel "

@@ -178,7 +178,18 @@ def find_spikes(time: FloatArray, values: FloatArray, quantity: Quantity) -> Dam
             break
         for start in _find_spike_starts(values, entered, width, least):
             mask[start : start + width] = True
+    mask |= np.isin(values, _list_codes(values, mask))
     return _make_damage(mask, Code.SPIKES)
+
+
+def _list_codes(values: FloatArray, spikes: Mask) -> FloatArray:
+    """List the numbers of several spikes beyond all other values: codes of an invalid value, also
+    where they stand for longer."""
+    numbers, counts = np.unique(values[spikes], return_counts=True)
+    repeated = numbers[counts > 1]
+    others = values[~np.isin(values, repeated)]
+    low, high = others.min(), others.max()
+    return np.asarray(repeated[(repeated < low) | (repeated > high)])
 
 
 def _find_spike_starts(
