@@ -94,32 +94,14 @@ def search(
         Where no draw can be simulated, or no start leads to a minimum.
     """
     guess = _Guess(start, np.array([_get_spread(one) for one in sought]), seed)
-    moved: tuple[FixedNumber, ...] = ()
-    with scale_progress(0.0, 0.58):
+    with scale_progress(0.0, 0.7):
         attempts = _refine_guess(problem, guess)
         if fixed and not _is_noise(attempts):
-            # Wrong fixed numbers lead the unknowns astray: all are sought from the first guess.
-            wide, point = extend(problem, start, fixed)
-            beside = replace(guess, point=point)
-            other = _refine_guess(wide, beside)
-            if _is_noise(other):
-                problem, guess, attempts, moved = wide, beside, other, tuple(fixed)
-        found = _seek(problem, guess, attempts)
-    with scale_progress(0.58, 1.0):
-        first, found = found, _lower_estimates(found)
-        if found is not first and not is_explained(found.result):
-            quieter = found.result.problem
-            again = _seek(quieter, guess, _refine_guess(quieter, guess))
-            if again.result.normal.cost < found.result.normal.cost:
-                found = _lower_estimates(again)
-        try:
-            with limit_evaluations(MAX_REFIT_WORK):
-                if not moved:
-                    best, moved = release_fixed(found.result, fixed, len(sought))
-                    found = replace(found, result=best)
-        except BudgetExceeded:
-            return replace(found, is_limited=True)
-        return _complete(replace(found, fixed=moved), stated)
+            found = _find_beside(problem, guess, attempts, fixed)
+        else:
+            found = _release(_find(problem, guess, attempts), fixed, len(sought))
+    with scale_progress(0.7, 1.0):
+        return _complete(found, stated)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,10 +140,51 @@ def _seek(problem: Problem, guess: _Guess, attempts: Attempts[Problem]) -> Found
     return FoundMinimum(best, tuple(attempts.starts), attempts.agreeing, budget.left < 0.0)
 
 
+def _find(problem: Problem, guess: _Guess, attempts: Attempts[Problem]) -> FoundMinimum:
+    """Find the minimum by the noise that is left there; again where that explains less."""
+    first = _seek(problem, guess, attempts)
+    found = _lower_estimates(first)
+    if found is first or is_explained(found.result):
+        return found
+    quieter = found.result.problem
+    again = _seek(quieter, guess, _refine_guess(quieter, guess))
+    if again.result.normal.cost < found.result.normal.cost:
+        return _lower_estimates(again)
+    return found
+
+
+def _find_beside(
+    problem: Problem, guess: _Guess, attempts: Attempts[Problem], fixed: Sequence[FixedNumber]
+) -> FoundMinimum:
+    """Find the minimum over unknowns and fixed numbers from the first guess.
+
+    Wrong fixed numbers lead the unknowns astray where these are sought alone. Fixed numbers that
+    are free may lead into a wrong minimum too; so the unknowns are sought alone where all together
+    do not explain the recordings.
+    """
+    wide, point = extend(problem, guess.point, fixed)
+    beside = replace(guess, point=point)
+    found = replace(_find(wide, beside, _refine_guess(wide, beside)), fixed=tuple(fixed))
+    if is_explained(found.result):
+        return found
+    other = _release(_find(problem, guess, attempts), fixed, guess.spread.size)
+    return min(found, other, key=lambda one: one.result.normal.cost)
+
+
+def _release(found: FoundMinimum, fixed: Sequence[FixedNumber], count: int) -> FoundMinimum:
+    """Minimise over the fixed numbers as well, from the minimum over `count` unknowns; that minimum
+    where the work of a refit does not suffice."""
+    try:
+        with limit_evaluations(MAX_REFIT_WORK):
+            best, moved = release_fixed(found.result, fixed, count)
+    except BudgetExceeded:
+        return replace(found, is_limited=True)
+    return replace(found, result=best, fixed=moved)
+
+
 def _complete(found: FoundMinimum, stated: Collection[str]) -> FoundMinimum:
     """Minimise over the omissions as well."""
-    best = found.result
-    complete = complete_model(best, stated)
+    complete = complete_model(found.result, stated)
     best, shown = complete.result, complete.shown
     is_limited = found.is_limited and not is_explained(best)
     best = best if is_limited else expect_inputs(best.problem, best) or best
