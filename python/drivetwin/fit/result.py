@@ -113,9 +113,8 @@ def judge_status(
     if failures:
         return ModelStatus.NOT_VALID
     weak = (Verdict.WEAK, Verdict.NOT_IDENTIFIABLE)
-    limited = any(
-        one.severity is Severity.ERROR or one.code is Code.RESIDUAL_ABOVE_NOISE for one in findings
-    )
+    limiting = (Code.RESIDUAL_ABOVE_NOISE, Code.OMISSION_SHOWN)
+    limited = any(one.severity is Severity.ERROR or one.code in limiting for one in findings)
     limited |= any(one.verdict in weak for one in estimates.values())
     return ModelStatus.LIMITED if limited else ModelStatus.VALID
 
