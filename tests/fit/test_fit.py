@@ -428,6 +428,27 @@ def test_channels_of_the_wrong_sign_are_refused(names: list[str]) -> None:
     assert named in (set(names), every - set(names))
 
 
+def test_exchanged_outputs_are_refused_by_name() -> None:
+    made = make_log(ModelName.ENGINE_START)
+    outputs = dict(made.recording.outputs)
+    pair = "engine speed", "wheel speed"
+    outputs.update({pair[0]: outputs[pair[1]], pair[1]: outputs[pair[0]]})
+    with pytest.raises(PlausibilityError, match="only with engine speed and wheel speed exchanged"):
+        fit_network(made.model, [replace(made.recording, outputs=outputs)])
+
+
+def test_a_prior_of_another_unit_is_no_residual() -> None:
+    made = make_log(ModelName.TIP_IN)
+    model = replace(
+        made.model, unknowns={**made.model.unknowns, "shaft.stiffness": Unknown(7.0, 2.5)}
+    )
+    found = fit_network(model, [made.recording])
+    assert found.values["shaft.stiffness"] == pytest.approx(9000.0, rel=0.05)
+    codes = {one.code for one in found.findings}
+    assert Code.PRIOR_MISSED in codes
+    assert Code.SEARCH_LIMITED not in codes
+
+
 def test_a_recorded_input_takes_the_place_of_that_of_the_model() -> None:
     model, recording = make_small(LEFT)
     found = fit_network(replace(model, inputs={"torque": 0.0}), [recording])

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -93,12 +94,12 @@ def fit_network(model: NetworkModel, recordings: Sequence[Recording], *, seed: i
     InputError
         With the path of an unknown, or the name of a channel, that is wrong.
     PlausibilityError
-        With the channels that the simulation follows with the other sign only.
+        With the channels that the simulation follows only with the other sign, or exchanged.
     IdentificationError
         Where no start leads to a minimum.
     """
     problem, point, numbers = build_problem(model, recordings)
-    _refuse_reversed(model, recordings, problem, point)
+    _refuse_misread(model, recordings, problem, point)
     plant = problem.terms[0].plant
     set_there = {one.path for one in plant.settings}
     fixed = list_fixed(plant.elements, plant.places, set_there, model.tolerances)
@@ -107,66 +108,79 @@ def fit_network(model: NetworkModel, recordings: Sequence[Recording], *, seed: i
     )
 
 
-def _refuse_reversed(
+def _refuse_misread(
     model: NetworkModel,
     recordings: Sequence[Recording],
     problem: Problem,
     point: ParameterVector,
 ) -> None:
-    """Raise PlausibilityError for channels whose other sign brings the simulation near the
-    recordings.
+    """Raise PlausibilityError for channels that bring the simulation near the recordings with the
+    other sign, or exchanged.
 
-    Channels are reversed at the first guess one after another, while that lowers the misfit.
+    Changes are tried at the first guess one after another, while they lower the misfit.
     """
-    left, names = list(_list_signed(model, recordings)), list[str]()
+    left, changes = _list_changes(model, recordings), list[_Change]()
     first = misfit = compute_misfit(problem, point)
     while left:
-        tries = [_reverse(recordings, {*names, one}) for one in left]
-        misfits = [compute_misfit(*build_problem(model, one)[:2]) for one in tries]
+        tries = [build_problem(model, _apply(recordings, [*changes, one]))[:2] for one in left]
+        misfits = [compute_misfit(*one) for one in tries]
         best = int(np.argmin(misfits))
         if not misfits[best] < misfit:
             break
         misfit = misfits[best]
-        names.append(left.pop(best))
+        changes.append(left.pop(best))
     if not first - misfit > math.log(SEARCH.far_ratio) * problem.size / len(model.outputs):
         return
-    other, start, _ = build_problem(model, _reverse(recordings, names))
-    as_read, turned = minimise(problem, point, rough=True), minimise(other, start, rough=True)
+    other, start, _ = build_problem(model, _apply(recordings, changes))
+    as_read, changed = minimise(problem, point, rough=True), minimise(other, start, rough=True)
     far = as_read.normal.cost / problem.size if as_read else np.inf
-    near = turned.normal.cost / problem.size if turned else np.inf
+    near = changed.normal.cost / problem.size if changed else np.inf
     if near < min(SEARCH.near_chi2, far / SEARCH.far_ratio):
+        texts = [
+            f"{a} and {b} exchanged" if a != b else f"the other sign of {a}" for a, b in changes
+        ]
         chi2 = f"{near:.3g} of the noise, as recorded {far:.3g}"
         raise PlausibilityError(
-            f"the simulation follows the recordings with the other sign of {', '.join(names)} "
-            f"only: the mean squared residual is then {chi2}",
-            "set sign = -1 at these channels of the model file, or reverse torque or gear there",
+            f"the simulation follows the recordings only with {', '.join(texts)}: the mean squared "
+            f"residual is then {chi2}",
+            "set source or sign = -1 of these channels in the model file, or correct the model",
         )
 
 
-def _list_signed(model: NetworkModel, recordings: Sequence[Recording]) -> Iterator[str]:
-    """List the outputs and the inputs that are no pressure."""
-    yield from model.outputs
-    for name in dict.fromkeys(name for one in recordings for name in one.inputs):
-        if find_input_quantity(name, model.elements) is not Quantity.PRESSURE:
-            yield name
+_Change = tuple[str, str]
+"""Two outputs to exchange, or twice the channel to reverse."""
 
 
-def _reverse(recordings: Sequence[Recording], names: Collection[str]) -> list[Recording]:
-    """Return recordings with the other sign of some channels."""
-    return [
-        replace(
-            one,
-            inputs={
-                name: replace(signal, values=-signal.values) if name in names else signal
-                for name, signal in one.inputs.items()
-            },
-            outputs={
-                name: replace(signal, values=-signal.values) if name in names else signal
-                for name, signal in one.outputs.items()
-            },
-        )
-        for one in recordings
+def _list_changes(model: NetworkModel, recordings: Sequence[Recording]) -> list[_Change]:
+    """List the outputs and the inputs that are no pressure, and the pairs of outputs of a kind."""
+    inputs = dict.fromkeys(name for one in recordings for name in one.inputs)
+    signed = [
+        name
+        for name in inputs
+        if find_input_quantity(name, model.elements) is not Quantity.PRESSURE
     ]
+    alike = [
+        (one, other)
+        for one, other in combinations(model.outputs, 2)
+        if model.outputs[one][0] == model.outputs[other][0]
+    ]
+    return [*((name, name) for name in (*model.outputs, *signed)), *alike]
+
+
+def _apply(recordings: Sequence[Recording], changes: Sequence[_Change]) -> list[Recording]:
+    """Return recordings with channels reversed and exchanged."""
+    changed = []
+    for one in recordings:
+        inputs, outputs = dict(one.inputs), dict(one.outputs)
+        for first, second in changes:
+            if first != second:
+                outputs[first], outputs[second] = outputs[second], outputs[first]
+            elif first in outputs:
+                outputs[first] = replace(outputs[first], values=-outputs[first].values)
+            else:
+                inputs[first] = replace(inputs[first], values=-inputs[first].values)
+        changed.append(replace(one, inputs=inputs, outputs=outputs))
+    return changed
 
 
 def build_problem(

@@ -449,9 +449,10 @@ def _try(found: OptimizeResult[Problem], one: Omission) -> _Tried:
 
 
 def is_explained(found: OptimizeResult[Problem]) -> bool:
-    """Return whether Q of a minimum is that of noise, within its scatter."""
+    """Return whether Q of a minimum, without priors, is that of noise, within its scatter."""
     size = found.problem.size
-    return bool(found.normal.cost < size + 3.0 * np.sqrt(2.0 * size))
+    cost = found.normal.cost - found.problem.prior.compute_prior_cost(found.point.values)
+    return bool(cost < size + 3.0 * np.sqrt(2.0 * size))
 
 
 def _put_into_model(

@@ -208,9 +208,13 @@ def _coarsen(problem: Problem) -> Problem:
 
 
 def _is_noise(attempts: Attempts[Problem], deviations: float = 3.0) -> bool:
-    """Return whether the least Q per sample is 1 within so many standard deviations of its
-    scatter."""
-    return attempts.chi2 < 1.0 + deviations * float(np.sqrt(2.0 / attempts.problem.size))
+    """Return whether the least Q per sample, without priors, is 1 within so many standard
+    deviations of its scatter."""
+    if not attempts.starts:
+        return False
+    best, size = attempts.best, attempts.problem.size
+    cost = best.cost - attempts.problem.prior.compute_prior_cost(best.point.values)
+    return cost < size + deviations * float(np.sqrt(2.0 * size))
 
 
 def _is_settled(attempts: Attempts[Problem]) -> bool:

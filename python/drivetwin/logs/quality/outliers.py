@@ -188,6 +188,8 @@ def _list_codes(values: FloatArray, spikes: Mask) -> FloatArray:
     numbers, counts = np.unique(values[spikes], return_counts=True)
     repeated = numbers[counts > 1]
     others = values[~np.isin(values, repeated)]
+    if not others.size:  # two levels, of which each makes spikes in the other
+        return others
     low, high = others.min(), others.max()
     return np.asarray(repeated[(repeated < low) | (repeated > high)])
 
