@@ -199,11 +199,11 @@ def _refuse_impossible(doubts: Sequence[Finding], log: ShiftLog) -> None:
     for one in doubts:
         if one.code is Code.TORQUE_REVERSED:
             raise PlausibilityError(one.cause, one.remedy, Where(file=log.source))
-        if one.code is Code.CARD_INERTIA_UNUSUAL and not _is_possible(one):
+        if one.code is Code.CARD_INERTIA_UNUSUAL and not _is_possible(one, "nearest"):
             raise PlausibilityError(one.cause, one.remedy, one.place)
 
 
-def _is_possible(one: Finding, name: str = "found") -> bool:
+def _is_possible(one: Finding, name: str) -> bool:
     """Return whether a number of a finding is near its usual range."""
     found, low, high = (one.numbers[key].value for key in (name, "low", "high"))
     return low / IMPOSSIBLE <= found <= high * IMPOSSIBLE

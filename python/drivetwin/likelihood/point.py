@@ -119,7 +119,7 @@ class NormalEquations:
     @property
     def excess(self) -> float:
         """Return Q per residual, at least 1: a difference of Q over it is one of deviations."""
-        return max(self.cost / sum(one.size for one in self.residuals), 1.0)
+        return max(self.cost / max(sum(one.size for one in self.residuals), 1), 1.0)
 
 
 class Objective(Protocol):

@@ -51,7 +51,7 @@ def check_entries(card: VehicleCard) -> list[Finding]:
     """Return a finding for each entry outside its usual range.
 
     The place of a finding has the key of the entry, its numbers are `found`, `low` and `high` in
-    the unit of the entry.
+    the unit of the entry, and the `nearest` of a range of entries to these limits.
     """
     return [
         *_check_ratios(card),
@@ -83,7 +83,8 @@ def _expect(
     outside = [one for one in found if not low <= one <= high]
     if outside:
         where = find_entry(card, place or ".".join((*key[:-1], field.entry)))
-        shown = {"found": outside[0], "low": low, "high": high}
+        nearest = min(max(low, min(found)), max(found))
+        shown = {"found": outside[0], "nearest": nearest, "low": low, "high": high}
         names = {"what": field.what, "why": why or field.why}
         yield report(Code(field.finding), "", where, **shown, **names)
 
