@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Gauss-Newton minimisers of an `Objective`: damped, and constrained.
+"""Gauss-Newton minimisers of an `Objective`: damped, with line search, and constrained.
 
 `minimise` is the damped method (Levenberg 1944, Marquardt 1963) on the information matrix. The
 parameters differ by ten orders of magnitude in size, so every matrix is scaled to a unit diagonal
@@ -88,6 +88,18 @@ class GaussNewtonSettings:
 
 
 @dataclass(frozen=True)
+class LineSearchSettings:
+    """Settings of the Gauss-Newton search with step halving."""
+
+    max_iter: int = 20
+    """Largest number of iterations [-]."""
+    max_halvings: int = 8
+    """Largest number of step lengths per iteration [-]."""
+    rtol: float = 1e-9
+    """Increase relative to Q that still counts as no increase [-]."""
+
+
+@dataclass(frozen=True)
 class ConstrainedSettings:
     """Settings of the equality-constrained Gauss-Newton search."""
 
@@ -98,6 +110,7 @@ class ConstrainedSettings:
 
 
 GAUSS_NEWTON = GaussNewtonSettings()
+LINE_SEARCH = LineSearchSettings()
 CONSTRAINED = ConstrainedSettings()
 _PROBE = 0.1
 """Share of a step after which the curvature of the model is measured [ratio]."""
@@ -222,6 +235,38 @@ def minimise(
             break
     last = problem.normal(point)
     return None if last is None else OptimizeResult(problem, point, last, False, iteration + 1)
+
+
+def minimise_with_line_search(
+    problem: P,
+    start: ParameterVector,
+    solve: Callable[[FloatArray, FloatArray], FloatArray],
+    tolerance: float,
+    settings: LineSearchSettings = LINE_SEARCH,
+) -> OptimizeResult[P]:
+    """Minimise a smooth Q from `start` by Gauss-Newton; stop at `tolerance` standard errors.
+
+    `solve` computes information⁻¹·gradient (p,). A step that raises Q is halved. If no halving
+    helps, the search ends at the point before it; that result is not converged.
+    """
+    point, normal = start, problem.normal(start)
+    for iteration in range(settings.max_iter):
+        assert normal is not None
+        step = -solve(normal.information, normal.gradient)
+        for _ in range(settings.max_halvings):
+            trial = point.replace_values(point.values + step)
+            if problem.cost(trial) <= normal.cost * (1.0 + settings.rtol):
+                break
+            step = 0.5 * step
+        else:
+            return OptimizeResult(problem, point, normal, False, iteration)
+        length = float(np.sqrt(step @ normal.information @ step))
+        point, normal = trial, problem.normal(trial)
+        assert normal is not None
+        if length < tolerance:
+            return OptimizeResult(problem, point, normal, True, iteration + 1)
+    assert normal is not None
+    return OptimizeResult(problem, point, normal, False, settings.max_iter)
 
 
 def minimise_constrained(

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
@@ -25,7 +25,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded, solve_banded
 from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.regression.modulating_functions import Quadrature
-from drivetwin.likelihood.gauss_newton import GAUSS_NEWTON, minimise, solve_step
+from drivetwin.likelihood.gauss_newton import minimise_with_line_search
 from drivetwin.likelihood.point import NormalEquations, ParameterVector, Prior
 
 NUGGET = 1e-9
@@ -164,9 +164,6 @@ class _Equations:
         """Compute the values (p,) after a straight `step` (p,)."""
         return point.values + step
 
-    def compute_curvature(self, *_: object) -> None:
-        """Return None: the steps stay straight."""
-
 
 def _compute_residual_covariance(terms: Sequence[Term]) -> FloatArray:
     """S (m, m): covariance of the residuals from the noise of all channels."""
@@ -244,15 +241,12 @@ def solve(
     values = np.asarray(start, dtype=float).copy()
     equations = _Equations(assemble, values.size, prior)
     names = tuple(str(k) for k in range(values.size))
-    limit = tolerance**2
-    settings = replace(
-        GAUSS_NEWTON, ftol=limit, kink_ftol=limit, bend_ratio=0.0, initial_damping=1e-9
-    )
-    found = minimise(equations, ParameterVector(names, values), settings=settings)
-    assert found is not None  # the equations can be evaluated everywhere
-    theta = found.point.values
-    if found.converged:  # the last step, within the tolerance
-        theta = theta + solve_step(found.normal.information, found.normal.gradient)
+    theta = minimise_with_line_search(
+        equations,
+        ParameterVector(names, values),
+        lambda m, gradient: _compute_information_inverse(m) @ gradient,
+        tolerance,
+    ).point.values
     point = equations.evaluate(theta)
     information = point.information - _estimate_spurious_information(
         assemble(theta), point, theta.size
