@@ -373,9 +373,8 @@ def _weigh_all(found: OptimizeResult[Problem], listed: Sequence[Omission]) -> li
     if normal is None:
         return []
     size = len(found.point.names)
-    counted = max(normal.cost / problem.size, 1.0)
-    adjusted = adjust_unknowns(normal.gradient, normal.information, size, counted)
-    alone = (np.diag(normal.information)[size:] - 1.0) / counted
+    adjusted = adjust_unknowns(normal.gradient, normal.information, size, normal.excess)
+    alone = (np.diag(normal.information)[size:] - 1.0) / normal.excess
     rows = zip(listed, np.diag(adjusted.own), adjusted.pull, adjusted.moves.T, alone, strict=True)
     return [
         _weigh(one, float(own), float(pull), moves)
@@ -440,8 +439,8 @@ def _try(found: OptimizeResult[Problem], one: Omission) -> _Tried:
     first = min(filter(None, ends), key=lambda end: end.normal.cost, default=None)
     if first is None:
         return _Tried(one, 0.0, None)
-    counted = max(first.normal.cost / problem.size, 1.0)
-    nats = 0.5 * (found.normal.cost - first.normal.cost) / counted - OMISSIONS.occam
+    fall = found.normal.cost - first.normal.cost
+    nats = 0.5 * fall / first.normal.excess - OMISSIONS.occam
     if OMISSIONS.odds * math.exp(min(nats, 700.0)) < 1.0:
         return _Tried(one, nats, None)
     again = first.problem.update_weighting(first.point)

@@ -15,7 +15,8 @@ _GRID = 80
 _HIGHEST = 3
 """Highest power of the time from the hinge."""
 _FINER = 10
-"""Ratio of the steps of two grids [-]."""
+"""Ratio of the steps of two grids: each gains a digit, about the best hinge of the one before
+[-]."""
 _RESOLUTION = 1.1e-5
 """Step at which the grids of hinges end [s]: 10 us, with the rounding of its tenths."""
 
