@@ -115,8 +115,8 @@ class Plant(RecordedPlant[RecordedData]):
         plain = (name for name, place in self._acting if not place.schema.differentiable)
         return list(dict.fromkeys(plain))
 
-    def list_of_channels(self) -> list[str]:
-        """List those of them that act on the channels of outputs alone, not on the run."""
+    def list_channel_coordinates(self) -> list[str]:
+        """List the undifferentiated coordinates that act on channels of outputs, not on the run."""
         tables: dict[str, set[object]] = {}
         for name, place in self._acting:
             tables.setdefault(name, set()).add(place.keys[0])

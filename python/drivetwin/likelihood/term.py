@@ -73,8 +73,8 @@ class RecordedPlant(ABC, Generic[R]):
         """List the coordinates that act on numbers by which the core has no derivatives."""
         return []
 
-    def list_of_channels(self) -> list[str]:
-        """List those of them that act on the channels of outputs alone, not on the run."""
+    def list_channel_coordinates(self) -> list[str]:
+        """List the undifferentiated coordinates that act on channels of outputs, not on the run."""
         return []
 
     def list_disturbances(
@@ -240,7 +240,7 @@ class RecordedTerm(Generic[P, R]):
         None if no step away from `point`, whose `run` leaves the `residual` (n,), can be
         simulated."""
         place, step = point.names.index(name), self.plant.get_step(name)
-        is_same = name in self.plant.list_of_channels()
+        is_same = name in self.plant.list_channel_coordinates()
         for side in (step, -step):
             values = point.values.copy()
             values[place] += side
