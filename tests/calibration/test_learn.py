@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from drivetwin.calibration.learn import Correction, correct_twin
-from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.spread import OilFriction, Spread
+from drivetwin.channels.roles import Quantity
+from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import IdentificationError
+from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.logs.read import read_log
 from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.twin.twin import Twin
@@ -115,3 +118,36 @@ def test_pressures_that_act_late_are_found_and_move_no_other_value(
     by_id = {one.id: one for one in found.values}
     for name in ("eta", "J_vehicle", "k_o", "mu.B3"):
         assert abs(by_id[name].after - by_id[name].before) < 3.0 * by_id[name].after_std
+
+
+def test_logs_at_several_oil_temperatures_find_the_slope_of_the_friction(
+    twin: Twin, tmp_path: Path
+) -> None:
+    """The log of the twin was at 80 °C; the unit is 3 % stronger, its μ falls by 0.1 % per kelvin."""
+    truth, at = -1e-3, 353.0
+    cold = replace(twin, validity={**twin.validity, OIL_TEMPERATURE: (at, at)})
+    logs = []
+    for change in (-40.0, 0.0, 30.0):
+        path, friction = tmp_path / f"{change:g}.csv", 1.0 + truth * change
+        write_bench_log(path, make_strong(twin, 1.03 * friction))
+        log = read_log(path, twin.build_card())
+        oil = Channel(
+            "temperature.oil",
+            Quantity.TEMPERATURE,
+            np.array([0.0, 4.0]),
+            np.full(2, at + change),
+            "Oil",
+            "K",
+        )
+        logs.append(replace(log, channels={**log.channels, "temperature.oil": oil}))
+    found = correct_twin(cold, logs, ("2", "3"), Spread())
+    slope = next(one for one in found.values if one.id == "mu_over_oil")
+    assert slope.after_std < 0.25 * slope.before_std
+    assert abs(slope.after - truth) < 3.0 * slope.after_std
+    strong = next(one for one in found.values if one.id == "mu.B3")
+    assert strong.after == pytest.approx(1.03 * strong.before, rel=3e-3)
+    assert found.oil.log_temperature == at + 30.0
+    before, after = found.rms["output_torque"]
+    assert after < 0.05 * before
+    constant = correct_twin(cold, logs[1:2], ("2", "3"), Spread())
+    assert constant.oil.std == pytest.approx(OilFriction().std)

@@ -14,10 +14,11 @@ from functools import cached_property
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.spread import Spread
+from drivetwin.calibration.spread import LEAST_AXIS, OilFriction, Spread, WarmUnit, warm_twin
 from drivetwin.channels.roles import get_pressure_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, Where
+from drivetwin.estimation.data.prepare import find_oil_temperature
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.estimate import Z95, Estimate, FrictionCurve
 from drivetwin.estimation.result.method import ModelStatus
@@ -54,8 +55,6 @@ _DELAYS = 3
 _FAR = 5.0
 """Standard deviations of made units from which a value is one of another vehicle: one of 2 million
 units is as far."""
-_LEAST = 1e-9
-"""Variance of a direction over the largest below which it is rounding [ratio]."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +62,11 @@ class LearnedValue:
     """Value of a parameter by id with its standard deviation, before and after the logs; SI."""
 
     id: str
+    unit: str
     before: float
     before_std: float
     after: float
     after_std: float
-
-    @property
-    def unit(self) -> str:
-        """SI unit."""
-        return get_parameter_spec(self.id).unit
 
     @property
     def moved(self) -> float:
@@ -90,11 +85,15 @@ class LoggedFit:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """Corrected twin, the values that the logs determined, and the shifts that they contain."""
+    """Corrected twin, the values that the logs determined, and the shifts that they contain.
+
+    `oil` is the friction over the oil temperature after the logs, over that of the corrected twin.
+    """
 
     twin: Twin
     values: tuple[LearnedValue, ...]
     fits: tuple[LoggedFit, ...]
+    oil: OilFriction
 
     @cached_property
     def rms(self) -> dict[str, tuple[float, float]]:
@@ -115,29 +114,54 @@ def _compute_rms(values: FloatArray) -> float:
 
 
 def correct_twin(
-    twin: Twin, logs: Sequence[ShiftLog], gears: tuple[str, str], spread: Spread
+    twin: Twin,
+    logs: Sequence[ShiftLog],
+    gears: tuple[str, str],
+    spread: Spread,
+    oil: OilFriction | None = None,
 ) -> Correction:
     """Correct a twin by logs of one vehicle that contain shifts between the same two `gears`.
+
+    Logs with an oil temperature correct the slope of μ over it, which `oil` states roughly before.
 
     Raises IdentificationError where a log contradicts the twin and production scatter, and what
     detection, identification and simulation raise.
     """
     after, shifts = twin, [_select_shifts(twin, log, gears) for log in logs]
     shift = shifts[0].shifts[0]
-    unit = _describe_unit(twin, shift, spread)
-    for log, some in zip(logs, shifts, strict=True):
-        card = build_prior_card(after, log, unit)
+    start = (oil or OilFriction()).place(twin)
+    first = _describe_unit(twin, shift, spread)
+    unit = made = WarmUnit(first, start, np.zeros(len(first.ids)))
+    temperatures = [_find_oil(log, some) for log, some in zip(logs, shifts, strict=True)]
+    for log, some, at in zip(logs, shifts, temperatures, strict=True):
+        after = warm_twin(after, unit.oil.compute_factor(at))
+        unit = unit.heat(at)
+        card = build_prior_card(after, log, unit.unit)
         found, late = _identify(log, card, some, after.get_value(PRESSURE_DELAY, 0.0))
         corrected = _merge(after, build_twin(found, card), late)
         _require_explained(attach_validation(found, corrected, log), log.source)
-        after, unit = corrected, _describe_unit(corrected, shift)
-        _require_unit(_describe_unit(twin, shift, spread), unit, log.source)
+        after, unit = corrected, unit.learn(_describe_unit(corrected, shift))
+        _require_unit(made.heat(at).unit, unit.unit, log.source)
     fits = tuple(
-        LoggedFit(log.source, *(simulate_shift(one, log, shift) for one in (twin, after)))
-        for log, some in zip(logs, shifts, strict=True)
+        LoggedFit(
+            log.source,
+            *(
+                simulate_shift(warm_twin(one, known.compute_factor(at)), log, shift)
+                for one, known in ((twin, start), (after, unit.oil))
+            ),
+        )
+        for log, some, at in zip(logs, shifts, temperatures, strict=True)
         for shift in some.shifts
     )
-    return Correction(after, tuple(_list_values(twin, after, shift)), fits)
+    cooled = warm_twin(after, unit.oil.compute_factor(start.log_temperature))
+    values = [*_list_values(twin, cooled, shift), *_list_slope(start, unit.oil)]
+    return Correction(after, tuple(values), fits, unit.oil)
+
+
+def _find_oil(log: ShiftLog, found: FoundShifts) -> float | None:
+    """Find the oil temperature [K] of a log; None where it has none."""
+    seen = find_oil_temperature(log, found.shifts)
+    return None if seen is None else 0.5 * sum(seen)
 
 
 def _identify(
@@ -215,7 +239,7 @@ def _list_sums(unit: ModelDistribution) -> Iterator[SumPrior]:
     scale = np.sqrt(np.diag(unit.covariance))
     power, axes = np.linalg.eigh(unit.covariance / np.outer(scale, scale))
     for one, axis in zip(power, axes.T, strict=True):
-        if one > _LEAST * power[-1]:
+        if one > LEAST_AXIS * power[-1]:
             factors = dict(zip(unit.ids, (axis / scale).tolist(), strict=True))
             yield SumPrior(factors, float(axis / scale @ unit.values), float(np.sqrt(one)))
 
@@ -310,17 +334,25 @@ def _require_unit(unit: ModelDistribution, found: ModelDistribution, source: str
 def _list_values(before: Twin, after: Twin, shift: Shift) -> Iterator[LearnedValue]:
     """List the values that the model of a shift depends on, before and after the logs.
 
-    The friction of an element is that at the middle slip of its curve, for an exact gain.
+    The friction of an element is that at the middle slip of its curve, for an exact gain, and
+    at the oil temperature of the first twin's log.
     """
     for name in before.list_model_ids(shift):
         one, other = (twin.parameters.get(name) for twin in (before, after))
         if one and other and one.value is not None and other.value is not None:
             stds = (one.std_total or 0.0, other.std_total or 0.0)
-            yield LearnedValue(name, one.value, stds[0], other.value, stds[1])
+            unit = get_parameter_spec(name).unit
+            yield LearnedValue(name, unit, one.value, stds[0], other.value, stds[1])
     for name in before.friction.keys() & {shift.offgoing, shift.oncoming}:
         curves = [twin.friction[name].drop_gain_spread() for twin in (before, after)]
         at = float(curves[0].slip[curves[0].slip.size // 2])
-        yield LearnedValue(f"mu.{name}", *(x for one in curves for x in _read_curve(one, at)))
+        yield LearnedValue(f"mu.{name}", "1", *(x for one in curves for x in _read_curve(one, at)))
+
+
+def _list_slope(before: OilFriction, after: OilFriction) -> Iterator[LearnedValue]:
+    """List the slope of μ over the oil temperature, over μ at that of the first twin's log."""
+    first = after.heat(before.log_temperature)
+    yield LearnedValue("mu_over_oil", "1/K", before.slope, before.std, first.slope, first.std)
 
 
 def _read_curve(curve: FrictionCurve, slip: float) -> tuple[float, float]:

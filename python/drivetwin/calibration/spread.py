@@ -3,7 +3,7 @@
 
 Spread: standard deviations of units of one type. Oil: μ(T) = μ(T_log)·(1 + s·(T - T_log)): the twin
 has μ at the oil temperature of its log. The slope s is known roughly; a log at one temperature does
-not determine it.
+not determine it. Logs of one unit at several temperatures do.
 """
 
 from __future__ import annotations
@@ -12,11 +12,16 @@ from dataclasses import dataclass, fields, replace
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
+from drivetwin._util.arrays import FloatArray
 from drivetwin.errors import InputError
+from drivetwin.estimation.identification import OIL_TEMPERATURE
+from drivetwin.parameters import LAW_KEYS
 from drivetwin.simulation.dual_clutch import DualClutch
-from drivetwin.twin.distribution import scale_friction
+from drivetwin.twin.distribution import ModelDistribution, scale_friction
+from drivetwin.twin.twin import Twin
 
 Share = Annotated[float, Field(ge=0, lt=0.5)]
 
@@ -79,6 +84,24 @@ class OilFriction:
     std: float = FRICTION_SLOPE_STD * abs(FRICTION_SLOPE)
     log_temperature: float | None = None
 
+    def place(self, twin: Twin) -> OilFriction:
+        """Return it with the oil temperature of a twin's log, unless one is stated."""
+        if self.log_temperature is not None or OIL_TEMPERATURE not in twin.validity:
+            return self
+        return replace(self, log_temperature=0.5 * sum(twin.validity[OIL_TEMPERATURE]))
+
+    def compute_factor(self, temperature: float | None) -> float:
+        """Compute μ at a temperature [K] over that at the log's; 1 where either is not known."""
+        if temperature is None or self.log_temperature is None:
+            return 1.0
+        return _compute_factor(self.slope, temperature - self.log_temperature)
+
+    def heat(self, temperature: float | None) -> OilFriction:
+        """Return it over the friction at a temperature [K]; None is that of the log."""
+        factor = self.compute_factor(temperature)
+        at = self.log_temperature if temperature is None else temperature
+        return OilFriction(self.slope / factor, self.std / factor, at)
+
 
 @dataclass(frozen=True)
 class OilState:
@@ -104,10 +127,87 @@ class OilState:
             Temperature above that of this oil [K].
         """
         slope = self.friction.slope if slope is None else slope
-        factor = max(1.0 + slope * (self.change + more), _LEAST)
+        factor = _compute_factor(slope, self.change + more)
         first, second = (scale_friction(one, factor) for one in model.elements)
         return replace(model, elements=(first, second))
 
 
 SAME_OIL = OilState()
 """Oil as in the twin's log, with the usual friction over the temperature."""
+
+
+def _compute_factor(slope: float, change: float) -> float:
+    return max(1.0 + slope * change, _LEAST)
+
+
+@dataclass(frozen=True, eq=False)
+class WarmUnit:
+    """Distribution of a made unit at an oil temperature, with the friction over the temperature.
+
+    `common` (p,) is the covariance of the slope with the values of the unit.
+    """
+
+    unit: ModelDistribution
+    oil: OilFriction
+    common: FloatArray
+
+    def heat(self, temperature: float | None) -> WarmUnit:
+        """Return the distribution at a temperature [K]; None is that of the unit.
+
+        x' = x·(1 + s·ΔT) for the coefficients of a friction law, linear about the mean of s.
+        """
+        oil, unit = self.oil.heat(temperature), self.unit
+        factor = self.oil.compute_factor(temperature)
+        acting = _find_scaled(unit.ids)
+        change = 0.0
+        if oil.log_temperature is not None and self.oil.log_temperature is not None:
+            change = oil.log_temperature - self.oil.log_temperature
+        scale, own = np.where(acting, factor, 1.0), change * acting * unit.values
+        common, variance = scale * self.common, self.oil.std**2
+        both = np.outer(own, common)
+        covariance = np.outer(scale, scale) * unit.covariance + both + both.T
+        moved = replace(
+            unit,
+            values=scale * unit.values,
+            covariance=covariance + variance * np.outer(own, own),
+        )
+        return WarmUnit(moved, oil, (common + variance * own) / factor)
+
+    def learn(self, found: ModelDistribution) -> WarmUnit:
+        """Return the distribution `found` with this one as prior, and the slope by it.
+
+        The slope follows the values by its regression on them: only these were measured.
+        """
+        own, other = (
+            np.array([one.ids.index(name) for name in self.unit.ids if name in found.ids])
+            for one in (self.unit, found)
+        )
+        prior = self.unit.covariance[np.ix_(own, own)]
+        scale = np.sqrt(np.diag(prior))
+        inverse = np.linalg.pinv(prior / np.outer(scale, scale), LEAST_AXIS, hermitian=True)
+        gain = inverse @ (self.common[own] / scale) / scale
+        posterior = found.covariance[np.ix_(other, other)]
+        less = float(gain @ (prior - posterior) @ gain)
+        slope = self.oil.slope + float(gain @ (found.values[other] - self.unit.values[own]))
+        std = float(np.sqrt(np.clip(self.oil.std**2 - less, 0.0, self.oil.std**2)))
+        common = found.covariance[:, other] @ gain
+        return WarmUnit(found, replace(self.oil, slope=slope, std=std), common)
+
+
+LEAST_AXIS = 1e-9
+"""Variance of a direction of a unit over the largest below which it is rounding [ratio]."""
+
+
+def warm_twin(twin: Twin, factor: float) -> Twin:
+    """Return the twin with its friction times a factor."""
+    covariance = twin.covariance
+    if covariance is not None:
+        scale = np.where(_find_scaled(twin.covariance_ids), factor, 1.0)
+        covariance = np.outer(scale, scale) * covariance
+    curves = {name: one.scale(factor) for name, one in twin.friction.items()}
+    return replace(twin, friction=curves, covariance=covariance)
+
+
+def _find_scaled(ids: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Find the coefficients of friction laws that a factor on μ multiplies."""
+    return np.array([one.partition(".")[0] in LAW_KEYS[:3] for one in ids], dtype=bool)

@@ -38,7 +38,6 @@ from drivetwin.calibration.scenarios import (
 )
 from drivetwin.calibration.twin_task import Request, build_task, choose_point
 from drivetwin.errors import ControllerError
-from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.simulation.driveline_run import INPUTS as SIGNALS
 from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.simulation.shift_control import INPUTS, ControlledUnit
@@ -282,7 +281,7 @@ def build_trial_task(
 ) -> Task:
     """Build the problem of a scenario: the shift under its conditions, and its draws."""
     oil, point = request.oil, choose_point(twin, request)
-    if oil.log_temperature is None and OIL_TEMPERATURE not in twin.validity:
+    if oil.place(twin).log_temperature is None:
         oil = replace(oil, log_temperature=given.oil_temperature)
     old, new = scenario.shift.split("-")
     at = replace(

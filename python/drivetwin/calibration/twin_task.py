@@ -33,7 +33,6 @@ from drivetwin.calibration.policy import Policy, Space
 from drivetwin.calibration.scenarios import Draw, Purpose, TwinDraws, UnitDraws
 from drivetwin.calibration.spread import OilFriction, OilState, Spread
 from drivetwin.errors import IdentificationError, InputError, Where
-from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.simulation.shift_control import Sensors, SpeedSensor
 from drivetwin.twin.twin import PRESSURE_DELAY, Twin, build_nominal_shift
@@ -206,9 +205,7 @@ def build_oil_state(twin: Twin, request: Request) -> OilState:
     wanted, friction = request.oil_temperature, request.oil
     if wanted is None:
         return OilState(0.0, friction)
-    known = friction.log_temperature
-    if known is None and OIL_TEMPERATURE in twin.validity:
-        known = 0.5 * sum(twin.validity[OIL_TEMPERATURE])
+    known = friction.place(twin).log_temperature
     if known is None:
         raise InputError(
             f"the twin {twin.name!r} does not say which oil temperature its log had",

@@ -120,7 +120,7 @@ def correct_by_logs(twin: Twin, logs: Sequence[Path], request: Request) -> Corre
     """
     read = [_read_shifts(twin, path, request.gears) for path in logs]
     with show_step(f"correcting {twin.name} by {len(read)} logs"):
-        return correct_twin(twin, read, request.gears, request.spread)
+        return correct_twin(twin, read, request.gears, request.spread, request.oil)
 
 
 def _read_shifts(twin: Twin, path: Path, gears: tuple[str, str]) -> ShiftLog:
@@ -261,6 +261,7 @@ def _build_request(
     if not logs:
         return replace(task, start=starts[0] if starts else {}), None
     correction = correct_by_logs(twin, logs, task)
+    task = replace(task, oil=correction.oil)
     if not starts:
         return task, correction
     return choose_start(correction.twin, task, starts), correction

@@ -165,12 +165,15 @@ def prepare(log: ShiftLog, card: VehicleCard, shifts: FoundShifts) -> PreparedLo
         inputs={**log.inputs, **card.inputs},
         findings=(*log.findings, *check_lockup_observed(log, card)),
         mapping=log.mapping,
-        oil_temperature=_find_oil_temperature(log, [one.shift for one in fitted]),
+        oil_temperature=find_oil_temperature(log, [one.shift for one in fitted]),
     )
 
 
-def _find_oil_temperature(log: ShiftLog, shifts: Sequence[Shift]) -> tuple[float, float] | None:
-    """Range of the oil temperature [K] at the shifts; it varies slowly, so gaps are bridged."""
+def find_oil_temperature(log: ShiftLog, shifts: Sequence[Shift]) -> tuple[float, float] | None:
+    """Find the range of the oil temperature [K] at shifts; None where the log has none.
+
+    It varies slowly, so gaps are bridged.
+    """
     roles = (f"temperature.{place}" for place in OIL_PLACES)
     channel = next((log[role] for role in roles if role in log), None)
     if channel is None or channel.time.size == 0:

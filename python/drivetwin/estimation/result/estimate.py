@@ -289,26 +289,31 @@ class FrictionCurve(DisplayMixin):
         """Symbol of the curve in a formula."""
         return "μ/η" if self.over_eta else "μ"
 
-    def scale_by_eta(self, eta: float, std: float = 0.0) -> FrictionCurve:
-        """μ of a curve that is μ/η, from η and its standard deviation, which widens the band."""
-        mu, law = eta * self.mu, self.stribeck
+    def scale(self, factor: float, std: float = 0.0) -> FrictionCurve:
+        """Return μ times a factor, whose standard deviation widens the band."""
+        mu, law = factor * self.mu, self.stribeck
         ends = (self.mu_lo, self.mu_hi)
-        below, above = (np.hypot(eta * (end - self.mu), Z95 * std * self.mu) for end in ends)
-        scale = np.array([eta, eta, 1.0, eta])
+        below, above = (np.hypot(factor * (end - self.mu), Z95 * std * self.mu) for end in ends)
+        scale = np.array([factor, factor, 1.0, factor])
         covariance = self.stribeck_covariance
         if law is not None and covariance is not None:
-            by_eta = np.array([law.mu_c, law.mu_s, 0.0, law.mu_v])
-            covariance = np.outer(scale, scale) * covariance + std**2 * np.outer(by_eta, by_eta)
+            values = np.array([law.mu_c, law.mu_s, 0.0, law.mu_v])
+            covariance = np.outer(scale, scale) * covariance + std**2 * np.outer(values, values)
+        if law is not None:
+            law = Stribeck(factor * law.mu_c, factor * law.mu_s, law.v_s, factor * law.mu_v)
         return replace(
             self,
             mu=mu,
             mu_lo=mu - below,
             mu_hi=mu + above,
-            points_mu=eta * self.points_mu,
-            stribeck=law and Stribeck(eta * law.mu_c, eta * law.mu_s, law.v_s, eta * law.mu_v),
+            points_mu=factor * self.points_mu,
+            stribeck=law,
             stribeck_covariance=covariance,
-            over_eta=False,
         )
+
+    def scale_by_eta(self, eta: float, std: float = 0.0) -> FrictionCurve:
+        """μ of a curve that is μ/η, from η and its standard deviation, which widens the band."""
+        return replace(self.scale(eta, std), over_eta=False)
 
 
 @dataclass(frozen=True)
