@@ -123,7 +123,7 @@ def test_pressures_that_act_late_are_found_and_move_no_other_value(
 def test_logs_at_several_oil_temperatures_find_the_slope_of_the_friction(
     twin: Twin, tmp_path: Path
 ) -> None:
-    """The log of the twin was at 80 °C; the unit is 3 % stronger, its μ falls by 0.1 % per kelvin."""
+    """The twin is of 80 °C; the unit is 3 % stronger, and its μ falls by 0.1 % per kelvin."""
     truth, at = -1e-3, 353.0
     cold = replace(twin, validity={**twin.validity, OIL_TEMPERATURE: (at, at)})
     logs = []
