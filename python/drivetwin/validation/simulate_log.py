@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -394,19 +394,3 @@ def format_signals(runs: Sequence[Validation], log: ShiftLog) -> str:
 def _format_value(value: float) -> str:
     """Format a value; empty for none."""
     return f"{value:.12g}" if value == value else ""
-
-
-@dataclass(frozen=True, eq=False)
-class LoggedShift:
-    """A shift and its log."""
-
-    log: ShiftLog
-    shift: Shift
-
-    def simulate(self, twin: Twin) -> Validation:
-        """Simulate the shift by a twin; raises as `simulate_shift`."""
-        return simulate_shift(twin, self.log, self.shift)
-
-    def get_period(self, role: str) -> float:
-        """Usual time between two samples of a channel [s]."""
-        return float(np.median(np.diff(self.log[role].time)))
