@@ -96,6 +96,7 @@ def test_fraction_and_temperature() -> None:
         ("mpa", Quantity.PRESSURE, "milli- or megapascal"),
         ("bara", Quantity.PRESSURE, "ambient pressure: give unit = 'bar' and offset = -1.013"),
         ("psia", Quantity.PRESSURE, "ambient pressure: give unit = 'psi' and offset = -14.7"),
+        ("kPa(abs)", Quantity.PRESSURE, "give unit = 'kPa' and offset = -101.3"),
         ("furlong", Quantity.SPEED, "unknown unit 'furlong'"),
         ("", Quantity.TORQUE, "names no unit"),
         (None, Quantity.TORQUE, "names no unit"),
@@ -153,3 +154,4 @@ def test_units_by_values(role: str, span: tuple[float, float] | None, units: lis
 def test_a_torque_that_may_be_in_percent_is_told() -> None:
     (found,) = propose_units("engine_torque", (0.0, 100.0))
     assert "scale = reference torque/100" in found.reason
+    assert not found.certain

@@ -62,6 +62,19 @@ def test_what_is_open_is_listed_with_proposals_and_candidates(tmp_path: Path) ->
     assert "output_torque" not in optional
 
 
+@pytest.mark.parametrize("unit", ["%", "bar(abs)", "of_max", ""])
+def test_only_a_unit_that_the_values_prove_is_accepted(tmp_path: Path, unit: str) -> None:
+    text = draft(
+        tmp_path,
+        {"EngTrq": (unit, 20, 80), "PrsBrk2": (unit, 0, 14), "SpdIn": ("", 1000, 1500)},
+        "--accept-proposals",
+    )
+    found = tomllib.loads(text)["channels"]
+    assert found["input_speed"]["unit"] == "rpm"
+    assert "unit" not in found["engine_torque"]
+    assert ("unit" in found["pressure"]["B2"]) == (not unit)
+
+
 def test_a_related_quantity_is_told_with_the_reason(tmp_path: Path) -> None:
     text = draft(tmp_path, {"ActualEngPercentTorque": ("%", 0, 100), "n_ein": ("rpm", 1100, 1500)})
     assert find_sources(text, "engine_torque") == ["ActualEngPercentTorque"]

@@ -51,10 +51,20 @@ _HEAD = (
 
 @dataclass(frozen=True)
 class UnitGap:
-    """Why the unit of a channel is not known, and the units that its values propose."""
+    """Why the unit of a channel is not known, and the units that its values propose.
+
+    If the file names an `unknown` unit, no proposal is certain.
+    """
 
     why: str
     proposals: tuple[Proposal, ...] = ()
+    unknown: bool = False
+
+    @property
+    def only_unit(self) -> str | None:
+        """The unit that is the only proposal and certain, else None."""
+        units = [one.unit for one in self.proposals if one.certain and not self.unknown]
+        return units[0] if len(units) == len(self.proposals) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -195,7 +205,7 @@ def _format_unit_gap(gap: UnitGap, accept: bool, usual: Sequence[str]) -> list[s
     if not gap.proposals:
         which = f"one of {', '.join(map(repr, usual))}" if usual else "s, ms or another unit"
         return [*lines, _comment(f'unit = "..."  # no proposal from the values; {which}')]
-    sure = accept and len(gap.proposals) == 1
+    sure = accept and gap.only_unit is not None
     for one in gap.proposals:
         entry = f"unit = {format_text(one.unit)}  # proposal: {escape_line(one.reason)}"
         lines.append(entry if sure else f"# {entry}")

@@ -91,16 +91,25 @@ _SPELLINGS: dict[Quantity, dict[float, str]] = {
 _CELSIUS = "°C degC deg_C Celsius C"
 _FAHRENHEIT = "°F degF deg_F Fahrenheit"
 
-_REFUSED = {
+_AMBIGUOUS = {
     "revolutions or radians may be meant": "1/s /s s-1 s^-1 Hz",
+    "milli- or megapascal may be meant": "mPa mpa MPA",
+}
+"""Spellings of several units, by the reason; the values may show which one is meant."""
+
+_ATMOSPHERE = {"bar": -1.013, "kPa": -101.3, "hPa": -1013, "mbar": -1013, "psi": -14.7}
+"""Offset that turns an absolute pressure into a gauge pressure."""
+_CONVERTED = {
     "a vehicle speed needs the tyre radius to become a wheel speed: give scale = 1/r_w for m/s, "
     "1/(3.6·r_w) for km/h and unit = 'rad/s'": "km/h kmh kph m/s mph",
-    "milli- or megapascal may be meant": "mPa mpa MPA",
-    "bar absolute holds the ambient pressure: give unit = 'bar' and offset = -1.013": "bara "
-    "bar(a) bar_a",
-    "psi absolute holds the ambient pressure: give unit = 'psi' and offset = -14.7": "psia",
+    **{
+        f"{unit} absolute holds the ambient pressure: give unit = '{unit}' and offset = {offset}": (
+            " ".join(f"{unit}{mark}" for mark in ("a", "(a)", "_a", "abs", "(abs)", "_abs"))
+        )
+        for unit, offset in _ATMOSPHERE.items()
+    },
 }
-"""Spellings that are known but cannot be taken as they stand, by the reason."""
+"""Spellings that need more than a unit, by the reason."""
 
 _TIME = {
     "s": 1.0,
@@ -160,7 +169,9 @@ UNITS: dict[str, Unit] = _build_unit_table()
 """Every accepted spelling in its normal form."""
 
 _REASONS = {
-    _normalise_spelling(each): why for why, all_of in _REFUSED.items() for each in all_of.split()
+    _normalise_spelling(each): why
+    for why, all_of in {**_AMBIGUOUS, **_CONVERTED}.items()
+    for each in all_of.split()
 }
 _BY_FOLDED = {spelling.casefold(): unit for spelling, unit in UNITS.items()}
 _REASONS_FOLDED = {spelling.casefold(): why for spelling, why in _REASONS.items()}
@@ -174,12 +185,19 @@ def find_unit(spelling: str) -> Unit | None:
     return None if text.casefold() in _REASONS_FOLDED else _BY_FOLDED.get(text.casefold())
 
 
+def is_ambiguous(spelling: str | None) -> bool:
+    """Return True for no unit and for a spelling of several units."""
+    text = _normalise_spelling(spelling or "").casefold()
+    return not text or _REASONS_FOLDED.get(text) in _AMBIGUOUS
+
+
 def is_unit(spelling: str) -> bool:
     """Return True if a text is a spelling of any unit, time and refused ones included."""
     refused = _normalise_spelling(spelling).casefold() in _REASONS_FOLDED
     return find_unit(spelling) is not None or refused or is_time_unit(spelling)
 
 
+_PERCENT_TORQUE = "in percent of a reference torque give unit = 'Nm', scale = reference torque/100"
 _BEGIN = "('drivetwin inspect LOG --write-mapping channels.toml' begins one)"
 
 
@@ -205,11 +223,9 @@ def resolve_channel_unit(
         raise UnitError(what or f"unknown unit {spelling!r}", remedy, where)
     if unit.quantity is not quantity:
         percent = unit.quantity is Quantity.FRACTION and quantity is Quantity.TORQUE
-        hint = "; percent torque needs scale = reference torque/100" if percent else ""
-        raise UnitError(
-            f"unit {spelling!r} is a {unit.quantity}, the channel is a {quantity}", remedy + hint,
-            where,
-        )  # fmt: skip
+        hint = f"; {_PERCENT_TORQUE}" if percent else ""
+        what = f"unit {spelling!r} is a {unit.quantity}, the channel is a {quantity}{hint}"
+        raise UnitError(what, remedy, where)
     return unit
 
 
@@ -295,11 +311,15 @@ _USUAL_STEP: Range = (2e-5, 0.25)
 
 @dataclass(frozen=True)
 class Proposal:
-    """A unit that makes the values usual, and the reason in words; 0 is the most usual `rank`."""
+    """A unit that makes the values usual, and the reason in words; 0 is the most usual `rank`.
+
+    It is not `certain` if the values are also usual in a unit of another quantity.
+    """
 
     unit: str
     reason: str
     rank: int = 0
+    certain: bool = True
 
 
 def propose_units(role: str, span: Range | None) -> tuple[Proposal, ...]:
@@ -329,8 +349,9 @@ def propose_units(role: str, span: Range | None) -> tuple[Proposal, ...]:
     if quantity is Quantity.FRACTION:
         fitting = [one for one in fitting if (one == "%") == (largest > _LEAST_PERCENT)]
     unusual = [unit for unit in factors if unit not in fitting]
+    percent = role == "engine_torque" and high <= _MOST_PERCENT_TORQUE
     return tuple(
-        Proposal(unit, _explain(role, span, unit, unusual), rank)
+        Proposal(unit, _explain(span, unit, unusual, percent=percent), rank, not percent)
         for rank, unit in enumerate(factors)
         if unit in fitting
     )
@@ -391,7 +412,7 @@ def _get_factor(unit: str) -> float:
     return found.factor
 
 
-def _explain(role: str, span: Range, unit: str, unusual: list[str]) -> str:
+def _explain(span: Range, unit: str, unusual: list[str], *, percent: bool) -> str:
     """Return the reason of a proposal."""
     low, high = span
     text = f"{low:.4g} to {high:.4g} is usual in {unit}"
@@ -399,6 +420,6 @@ def _explain(role: str, span: Range, unit: str, unusual: list[str]) -> str:
         text += f", not in {' or '.join(unusual)}"
     else:
         text += ", but other units are possible"
-    if role == "engine_torque" and unit == "Nm" and high <= _MOST_PERCENT_TORQUE:
-        text += "; in percent of a reference torque give scale = reference torque/100"
+    if percent:
+        text += f"; {_PERCENT_TORQUE}"
     return text

@@ -86,7 +86,7 @@ def _build_seen(seen: _Seen, draft: Draft, name: str) -> Iterator[Block]:
             for role, units in draft.proposed_units.items()
         )
         notes.append(
-            f"no unit, proposed from the values: {listed}; state it in a channel mapping: "
+            f"no usable unit, proposed from the values: {listed}; state it in a channel mapping: "
             "--write-mapping channels.toml writes one, with --accept-proposals with the units "
             "that are the only proposal"
         )

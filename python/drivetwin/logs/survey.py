@@ -30,6 +30,8 @@ from drivetwin.channels.roles import Column as LogColumn
 from drivetwin.channels.shiftlog import FloatArray
 from drivetwin.channels.units import (
     find_unit,
+    is_ambiguous,
+    is_unit,
     propose_missing_units,
     propose_time_units,
     propose_units,
@@ -108,7 +110,7 @@ def _describe_role(role: str) -> str:
 
 def _list_unit_gaps(survey: Survey) -> dict[str, UnitGap]:
     """Return the roles of the mapping whose unit the log does not name, or names unclearly."""
-    reasons: dict[str, str] = {}
+    faults: dict[str, tuple[str, bool]] = {}
     spans: dict[str, tuple[float, float] | None] = {}
     for role, spec in survey.mapping.items():
         column = _find_column(survey, spec)
@@ -117,9 +119,12 @@ def _list_unit_gaps(survey: Survey) -> dict[str, UnitGap]:
         try:
             resolve_channel_unit(column.unit, get_quantity(role), Where())
         except UnitError as fault:
-            reasons[role], spans[role] = fault.what, column.range
+            unclear = is_ambiguous(column.unit)
+            known = not unclear and is_unit(column.unit or "")
+            faults[role] = fault.what, not unclear
+            spans[role] = None if known else column.range
     proposals = propose_missing_units(spans)
-    return {role: UnitGap(why, proposals[role]) for role, why in reasons.items()}
+    return {role: UnitGap(why, proposals[role], odd) for role, (why, odd) in faults.items()}
 
 
 def _find_column(survey: Survey, spec: ChannelSpec) -> Column | None:

@@ -86,7 +86,7 @@ def list_unit_names() -> list[str]:
 def list_rows(survey: Survey) -> list[Row]:
     """The columns with the role, unit and sign that they are read with."""
     gaps = draft_mapping(survey).units
-    likely = {role: gap.proposals[0].unit for role, gap in gaps.items() if len(gap.proposals) == 1}
+    likely = {role: unit for role, gap in gaps.items() if (unit := gap.only_unit) is not None}
     return [_make_row(column, survey, likely) for column in survey.columns]
 
 
