@@ -13,6 +13,7 @@ from drivetwin.calibration.identified_range import check_identified_range
 from drivetwin.calibration.metrics import Metric
 from drivetwin.calibration.objective import Hardware, Limit
 from drivetwin.calibration.options import PolicyKind
+from drivetwin.calibration.scenarios import UnitDraws
 from drivetwin.calibration.spread import OilFriction, Spread
 from drivetwin.calibration.twin_task import Request, build_task
 from drivetwin.errors import IdentificationError, InputError
@@ -209,6 +210,24 @@ def test_drawn_actuators_have_the_stated_spread_and_covariance() -> None:
     assert kiss.std() == pytest.approx(20.0, rel=0.06)
     assert {each.oncoming.hysteresis for each in units} == {one.model.hysteresis}
     assert all(each.offgoing.dead_time == each.oncoming.dead_time for each in units)
+
+
+def test_draws_of_an_actuator_keep_correlations_of_small_values_beside_pressures() -> None:
+    std = np.array([4e-4, 0.02, 4e-4, 0.01, 5e4, 0.1, 4e3])
+    correlation, some = np.full((7, 7), 1e-3) + (1.0 - 1e-3) * np.eye(7), [0, 2, 3, 6]
+    correlation[np.ix_(some, some)] = [
+        [1.0, -0.96, 0.86, -0.68],
+        [-0.96, 1.0, -0.93, 0.67],
+        [0.86, -0.93, 1.0, -0.86],
+        [-0.68, 0.67, -0.86, 1.0],
+    ]
+    one = replace(FILLING, covariance=np.outer(std, std) * correlation)
+    draws = UnitDraws(one, one, 0.05, Spread(dead_time=0.0, actuator_lag=0.0))
+    random = np.random.default_rng(1)
+    units = [draws(random)(random).offgoing for _ in range(2000)]
+    drawn = np.array([[unit.dead_time, unit.falling_lag] for unit in units])
+    assert drawn.std(axis=0) == pytest.approx(std[[0, 2]], rel=0.1)
+    assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(-0.96, abs=0.02)
 
 
 def test_draws_follow_seed_and_purpose_and_keep_their_units() -> None:

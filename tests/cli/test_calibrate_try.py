@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -54,6 +55,16 @@ def write_scenarios(folder: Path, text: str) -> Path:
     path = folder / "scenarios.toml"
     path.write_text(text)
     return path
+
+
+def test_a_failure_has_the_unit_at_both_numbers(tmp_path: Path, controller: Path) -> None:
+    bounds = "{ friction_energy_J = 1000.0, friction_energy_of_nominal = 0.5 }"
+    text = f'[[scenarios]]\nname = "one"\ndraws = 1\nassert = {bounds}\n'
+    scenarios = write_scenarios(tmp_path, text)
+    assert run(controller, "--scenarios", str(scenarios), "-o", str(tmp_path / "out")) == 1
+    junit = (tmp_path / "out" / "junit.xml").read_text()
+    assert re.search(r"friction_energy_J: [\d.]+ kJ in run 0, above 1 kJ \(1 of 1 runs\)", junit)
+    assert re.search(r"friction_energy_of_nominal: [\d.]+ kJ in run 0, above [\d.]+ kJ", junit)
 
 
 def test_a_right_controller_passes_the_stock_scenarios(

@@ -44,10 +44,11 @@ def test_reads_the_spread(tmp_path: Path) -> None:
 def test_reads_bounds_and_oil(tmp_path: Path) -> None:
     path = tmp_path / "limits.toml"
     path.write_text(
-        "[limits]\n[bounds]\nfill_time = 0.09\nreduction_depth = [0, 300]\n"
+        "[bounds]\nfill_time = 0.09\nreduction_depth = [0, 300]\n"
         "[oil]\nlog_temperature_C = 80\nfriction_slope_per_K = -2e-3\n"
     )
     found = load_limits(path)
+    assert found.limits == ()
     assert found.bounds == {"fill_time": (0.09, 0.09), "reduction_depth": (0.0, 300.0)}
     assert found.oil.slope == -2e-3
     assert found.oil.std == pytest.approx(6e-4)
@@ -61,7 +62,6 @@ def test_reads_bounds_and_oil(tmp_path: Path) -> None:
         ("[limits]\nshift_time_s = -1.0\n", r"limits.shift_time_s"),
         ("[limits]\nshift_time_s = nan\n", r"limits.shift_time_s"),
         ("[limits]\nshift_time_s = 'a'\n", r"limits.shift_time_s"),
-        ("[spread]\ngain = 0.1\n", "limits"),
         ("[limits]\n[spread]\ngain = -1\n", r"spread.gain"),
         ("[limits]\n[spread]\ngian = 0.1\n", r"gian"),
         ("[limits]\n[spread]\ndead_time = 0.1\n", r"spread.dead_time.*unknown key.*'dead_time_s'"),

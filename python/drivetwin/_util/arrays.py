@@ -54,6 +54,23 @@ def remember_for_arrays(function: Callable[P, Result]) -> Callable[P, Result]:
     return remembered
 
 
+_NEGLIGIBLE = 1e-9
+"""Variance of a direction over the largest below which it is rounding [ratio]."""
+
+
+def compute_directions(covariance: FloatArray) -> FloatArray:
+    """Return columns (p, r) of one standard deviation each, independent, of a `covariance` (p, p).
+
+    They are those of the correlations, because the units of the values may differ by many powers
+    of ten.
+    """
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    unit = covariance / np.outer(*(np.where(scale > 0.0, scale, np.inf),) * 2)
+    power, axes = np.linalg.eigh(unit)
+    kept = power > _NEGLIGIBLE * max(1.0, float(power[-1]))
+    return np.asarray(scale[:, None] * axes[:, kept] * np.sqrt(power[kept]))
+
+
 def propagate_variance(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return the variances (n,) of values with `slopes` (n, p) by parameters of a `covariance`
     (p, p)."""

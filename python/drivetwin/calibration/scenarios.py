@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import FloatArray, compute_directions
 from drivetwin.actuator.model import QUANTITIES, ActuatorModel, IdentifiedActuator
 from drivetwin.calibration.maneuver import Maneuver
 from drivetwin.calibration.spread import SAME_OIL, OilState, Spread
@@ -54,12 +54,6 @@ class DesignedNormals(np.random.Generator):
     def normal(self, loc: Any = 0.0, scale: Any = 1.0, size: Any = None) -> Any:
         """Return the next numbers of the design with a mean and a standard deviation."""
         return loc + scale * self.standard_normal(size)
-
-    def multivariate_normal(self, mean: Any, cov: Any, *_: Any, **__: Any) -> Any:
-        """Return the next numbers of the design with a mean (n,) and a covariance (n, n)."""
-        values, vectors = np.linalg.eigh(cov)
-        drawn = np.sqrt(np.maximum(values, 0.0)) * self.standard_normal(len(mean))
-        return mean + vectors @ drawn
 
 
 def list_designed(count: int, seed: list[int]) -> list[np.random.Generator]:
@@ -143,8 +137,8 @@ def scale_unit(unit: ControlledUnit, spread: Spread, random: np.random.Generator
 
 def _draw_actuator(one: IdentifiedActuator, random: np.random.Generator) -> ActuatorModel:
     finite = np.isfinite(one.std)
-    covariance = np.where(np.outer(finite, finite), one.covariance, 0.0)
-    drawn = random.multivariate_normal(one.model.values, covariance, method="eigh")
+    directions = compute_directions(np.where(np.outer(finite, finite), one.covariance, 0.0))
+    drawn = one.model.values + directions @ random.standard_normal(directions.shape[1])
     return ActuatorModel.from_values(_clip(drawn))
 
 

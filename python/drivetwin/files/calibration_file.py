@@ -384,7 +384,7 @@ class OilRecord(Record):
 class LimitsFile(Record):
     """File of limits: upper bounds, spread, oil, hardware, sensors, bounds of parameters."""
 
-    limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]]
+    limits: dict[str, Annotated[FiniteFloat, Field(gt=0)]] = Field(default_factory=dict)
     spread: Spread = Spread()
     oil: OilRecord = OilRecord()
     hardware: Hardware = Hardware()

@@ -229,10 +229,13 @@ def _describe(check: Check, trial: Trial) -> str:
         return ""
     counted = check.quantity not in METRICS or check.scale is Scale.CHANGE
     display = Display("") if counted else get_metric_display(Metric(check.quantity))
+    worst, bound = (
+        f"{value * display.factor:.4g} {display.label}".rstrip()
+        for value in (check.worst, check.bound)
+    )
     return (
-        f"{check.key} is {check.worst * display.factor:.4g} in run {check.place}, above "
-        f"{check.bound * display.factor:.4g} {display.label}".rstrip()
-        + f" ({check.failed} of {trial.scenario.draws} runs)"
+        f"{check.key}: {worst} in run {check.place}, above {bound} "
+        f"({check.failed} of {trial.scenario.draws} runs)"
     )
 
 

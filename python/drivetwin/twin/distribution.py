@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
-from drivetwin._util.arrays import FloatArray, propagate_variance
+from drivetwin._util.arrays import FloatArray, compute_directions, propagate_variance
 from drivetwin.estimation.direct.friction_law import build_law_derivatives
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve
 from drivetwin.parameters import LAW_KEYS, OVER_ETA, SPECS, make_law_id
@@ -76,10 +76,6 @@ def build_partner_spread(law: Stribeck, level: float) -> FloatArray:
     return level**2 * np.outer(scaled, scaled) + np.outer(rest, rest)
 
 
-_NEGLIGIBLE = 1e-9
-"""Variance of a direction over the largest below which it is rounding [ratio]."""
-
-
 @dataclass(frozen=True, eq=False)
 class ModelDistribution:
     """Normal distribution of parameters and friction laws of one shift.
@@ -99,11 +95,7 @@ class ModelDistribution:
     @cached_property
     def directions(self) -> FloatArray:
         """Columns (p, r) of one standard deviation each, independent of each other."""
-        scale = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        unit = self.covariance / np.outer(*(np.where(scale > 0.0, scale, np.inf),) * 2)
-        power, axes = np.linalg.eigh(unit)
-        kept = power > _NEGLIGIBLE * max(1.0, float(power[-1]))
-        return np.asarray(scale[:, None] * axes[:, kept] * np.sqrt(power[kept]))
+        return compute_directions(self.covariance)
 
     def to_named(self, values: FloatArray) -> dict[str, float]:
         """Return `values` (p,) by id."""
