@@ -77,7 +77,7 @@ def test_what_nobody_needs_may_be_missing() -> None:
     mapped = resolve_roles(columns(["SpdIn", "SpdOut"]), {}, ELEMENTS, ("input_speed",), "log.csv")
     assert list(mapped.channels) == ["input_speed", "output_speed"]
     assert render(mapped.findings) == (
-        "No pressure of B2, B3: nothing that depends on it can be estimated.",
+        "No pressure of B2, B3: nothing that depends on it can be identified.",
     )
 
 

@@ -40,6 +40,26 @@ def test_writes_torques_with_their_deviation(
         assert (columns["output_torque_std"].values > 0.0).all()
 
 
+@pytest.mark.parametrize("command", ["observe", "simulate"])
+def test_faults_of_the_log_stand_beside_the_result(
+    bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    twin, whole = bench.files
+    head, units, *rows = whole.read_text(encoding="utf-8").splitlines()
+    place = head.split(",").index("EngTrq")
+    cells = [row.split(",") for row in rows]
+    for row in cells:
+        if 0.3 < float(row[0]) < 0.5:
+            row[place] = ""
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([head, units, *map(",".join, cells)]) + "\n", encoding="utf-8")
+    assert main([command, str(twin), str(log), "--json"]) == 0
+    texts = [one["text"] for one in json.loads(capsys.readouterr().out)["findings"]]
+    assert any("'EngTrq': No samples from 0.3" in text for text in texts)
+    assert main([command, str(twin), str(log)]) == 0
+    assert "'EngTrq': No samples from 0.3" in capsys.readouterr().out
+
+
 def test_time_increases_from_shift_to_shift() -> None:
     """The gear between two shifts is observed with both of them."""
     found = []

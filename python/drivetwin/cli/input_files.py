@@ -18,9 +18,13 @@ from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.cli.options import TWIN
 from drivetwin.cli.output import show_findings, show_step
 from drivetwin.errors import CardError, FileFormatError, InputError, ResultFileError, Where
+from drivetwin.files.records import dump_findings
 from drivetwin.logs.formats.detect import is_binary_log
 from drivetwin.logs.raw import HEAD_BYTES
 from drivetwin.logs.read import read_log
+from drivetwin.report.blocks import Block, build_findings_section, make_notes
+from drivetwin.shifts.detect import FoundShifts, find_causes
+from drivetwin.shifts.summary import list_remarks
 from drivetwin.twin.twin import Twin
 from drivetwin.vehicle.card import VehicleCard, load_card
 
@@ -50,6 +54,20 @@ def read_twin_log(
         recording = read_log(log, card, find_mapping(channels, log))
     show_findings(one for one in recording.findings if one.code in RECALLED)
     return recording, card
+
+
+def build_log_remarks(
+    log: ShiftLog, card: VehicleCard, found: FoundShifts
+) -> tuple[list[Block], dict[str, Any]]:
+    """Build remarks on the shifts of a log and its findings, and the document of both.
+
+    Findings that `read_twin_log` shows are left out.
+    """
+    noted = (*log.findings, *find_causes(log, card))
+    findings = tuple(one for one in noted if one.code not in RECALLED)
+    blocks = make_notes("Remarks on shifts", list_remarks(found))
+    document = {"rejected": found.rejected, "findings": dump_findings(findings)}
+    return [*blocks, *build_findings_section(findings).blocks], document
 
 
 _TOML_LINE = re.compile(r"""^\s*(?:[\w."'-]+\s*=|\[+[\w."' -]+\]+\s*(?:#.*)?$)""")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from drivetwin._util.request import LOG_ENDINGS, PAGE, select_outputs
-from drivetwin.cli.input_files import read_twin_log
+from drivetwin.cli.input_files import build_log_remarks, read_twin_log
 from drivetwin.cli.output import show_step, write_atomically
 from drivetwin.cli.requests.use import Observe
 from drivetwin.errors import DamagedChannelError
@@ -42,9 +42,11 @@ def observe(request: Observe) -> Outcome:
         save_page(page, build_observer_page(found, recording))
     reasons = [f"Shift {name}: {reason}" for name, reason in left_out.items()]
     blocks = [block for one in found for block in build_torque_blocks(one)]
+    remarks, noted = build_log_remarks(recording, card, shifts)
+    listed = {"shifts": [_describe_torques(one) for one in found], "left_out": left_out}
     return Outcome(
-        [*blocks, *make_notes("Left out", reasons, Tone.DOUBTFUL)],
-        {"shifts": [_describe_torques(one) for one in found], "left_out": left_out},
+        [*blocks, *make_notes("Left out", reasons, Tone.DOUBTFUL), *remarks],
+        listed | noted,
         request.output,
     )
 

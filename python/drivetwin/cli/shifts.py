@@ -47,9 +47,8 @@ from drivetwin.shifts.lockup_clutch import LockUp, detect_lock_ups
 from drivetwin.shifts.shift import Shift, make_shift_labels
 from drivetwin.shifts.summary import (
     FigureComparison,
-    collect_findings,
-    collect_rejected,
     compare_drives,
+    list_remarks,
     summarize_shifts,
 )
 from drivetwin.vehicle.card import VehicleCard, is_ratio_card, load_card, load_ratio_card
@@ -171,7 +170,7 @@ def _build_details(
     reasons = (f"gear {gear.gear}: {gear.reason}" for gear in seen.gears if gear.reason)
     yield from make_notes("Gears without an inertia", reasons)
     yield from make_notes("Resonance after the shifts", _list_resonances(seen))
-    yield from make_notes("Remarks on shifts", _list_remarks(found))
+    yield from make_notes("Remarks on shifts", list_remarks(found))
 
 
 def _list_resonances(seen: _SpeedResults) -> Iterator[str]:
@@ -186,18 +185,6 @@ def _list_resonances(seen: _SpeedResults) -> Iterator[str]:
         names = ", ".join(dict.fromkeys(labels))
         count = f" ({len(labels)} shifts)" if len(labels) > 1 else ""
         yield f"{names}{count}: {reason}"
-
-
-def _list_remarks(found: FoundShifts) -> Iterator[str]:
-    """Yield each kind of finding and each reason of rejection once, with their number."""
-    for finding, labels in collect_findings(found.shifts):
-        names = ", ".join(dict.fromkeys(labels))
-        more = f" ({len(labels)} shifts: {names})" if len(labels) > 1 else ""
-        yield f"{finding.severity}: {finding.set_subject(labels[0]).text}{more}"
-    for candidate, count in collect_rejected(found.rejected):
-        start, end = candidate.time
-        more = f" (first of {count} for this reason)" if count > 1 else ""
-        yield f"rejected, {start:z.3f} s to {end:z.3f} s: {candidate.reason}{more}"
 
 
 def _describe_resonance(swing: Resonance) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from drivetwin._util.atomic import write_text
 from drivetwin._util.request import PAGE, select_outputs
 from drivetwin.cli.fit import read_recordings
-from drivetwin.cli.input_files import read_twin_log
+from drivetwin.cli.input_files import build_log_remarks, read_twin_log
 from drivetwin.cli.options import MODEL, TCU_RESULT, TWIN
 from drivetwin.cli.output import print_line, show_step
 from drivetwin.cli.requests.use import Simulate
@@ -84,7 +84,8 @@ def _simulate_twin(made: MadeResult, request: Simulate) -> Outcome:
         }
         for run in runs
     ]
-    return Outcome(blocks, {"shifts": listed}, request.output)
+    remarks, noted = build_log_remarks(recording, card, shifts)
+    return Outcome([*blocks, *remarks], {"shifts": listed} | noted, request.output)
 
 
 def _find_controller_twin(source: Path) -> Path | None:

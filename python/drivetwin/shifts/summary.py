@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivetwin._util.arrays import FloatArray
 from drivetwin.findings import Code, Finding
+from drivetwin.shifts.detect import FoundShifts
 from drivetwin.shifts.shift import RejectedShift, Shift
 from drivetwin.vehicle.spec import ShiftKind
 
@@ -374,3 +375,15 @@ def collect_rejected(
         first.setdefault(one.reason, one)
         count[one.reason] = count.get(one.reason, 0) + 1
     return tuple((first[reason], count[reason]) for reason in first)
+
+
+def list_remarks(found: FoundShifts) -> Iterator[str]:
+    """List each kind of finding and each reason of rejection once, with their number."""
+    for finding, labels in collect_findings(found.shifts):
+        names = ", ".join(dict.fromkeys(labels))
+        more = f" ({len(labels)} shifts: {names})" if len(labels) > 1 else ""
+        yield f"{finding.severity}: {finding.set_subject(labels[0]).text}{more}"
+    for candidate, count in collect_rejected(found.rejected):
+        start, end = candidate.time
+        more = f" (first of {count} for this reason)" if count > 1 else ""
+        yield f"rejected, {start:z.3f} s to {end:z.3f} s: {candidate.reason}{more}"
