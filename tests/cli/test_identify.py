@@ -157,6 +157,18 @@ def test_a_bad_card_is_told_once_for_all_logs(
     assert capsys.readouterr().err.count("error: ") == 1
 
 
+def test_a_record_that_begins_while_the_shaft_oscillates_is_followed(
+    written: Written, bench_files: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head, units, *rows = bench_files.log.read_text(encoding="utf-8").splitlines()
+    kept = [row for row in rows if not 0.5 < float(row.partition(",")[0]) < 0.9]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([head, units, *kept]) + "\n", encoding="utf-8")
+    assert main(["simulate", str(written.folder), str(log), "--json"]) == 0
+    (shift,) = json.loads(capsys.readouterr().out)["shifts"]
+    assert shift["fit"]["output_torque"]["before"]["fit_percent"] > 90.0
+
+
 @pytest.mark.parametrize("status", list(ModelStatus))
 def test_strict_passes_a_confirmed_model_only(
     bench_files: Files, monkeypatch: pytest.MonkeyPatch, status: ModelStatus

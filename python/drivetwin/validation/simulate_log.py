@@ -17,6 +17,7 @@ from drivetwin.errors import DamagedChannelError, MissingParameterError, Where
 from drivetwin.estimation.identification import Identification
 from drivetwin.estimation.result.validation import SignalTrace, Validation
 from drivetwin.findings import Code, Finding, report
+from drivetwin.likelihood.measured_signal import estimate_white_noise
 from drivetwin.likelihood.output import SignalFit, compute_fit
 from drivetwin.shifts.detect import trim_to_recorded, trim_to_window
 from drivetwin.shifts.lockup_clutch import refer_to_turbine
@@ -40,6 +41,13 @@ EXTRA_SIGNALS = ("engine_speed", "wheel_speed")
 """Signals that follow from the compared ones by fixed ratios or the final drive: displayed only."""
 _GRID = 1e-3
 """Output step [s] of the simulation: 80 points per period of a 12 Hz oscillation."""
+
+_REFINED = 0.3
+"""Time [s] whose signals determine the start: a period of the slowest shaft oscillation in gear."""
+_ROUNDING = 1e-9
+"""Noise of a signal without noise, relative to its largest value."""
+_STEP = 0.01
+"""Change of a speed [rad/s] of the differences: far too small for an element to slip."""
 
 Start = tuple[float, State]
 """Time [s] and state from which a simulation starts."""
@@ -100,6 +108,8 @@ def _simulate_window(
     start = state or estimate_start_state(model, log, shift, window[0])
     added = twin.build_added_elements(model)
     task = DrivelineTask(model, added, engine_torque, pressures, start, time)
+    if state is None and "output_torque" in log:
+        task = replace(task, start=_refine_start(task, log, shift.torque_phase[0]))
     trajectory = task.simulate()
     validation = Validation(
         shift=shift,
@@ -114,6 +124,45 @@ def _simulate_window(
         findings=(),
     )
     return replace_run(validation, twin, log, trajectory)
+
+
+def _refine_start(task: DrivelineTask, log: ShiftLog, end: float) -> State:
+    """Fit the start to the first `_REFINED` seconds before `end` [s], while the gear is held.
+
+    A shaft that oscillates or a torque that changes is not seen in a few samples. The signals are
+    linear in the start: one step suffices. It is left out where it explains them no better.
+    """
+    start, until = task.start, min(end, float(task.time[0]) + _REFINED)
+    short = replace(task, time=task.time[task.time <= until])
+    ratio = task.model.get_overall_ratio(start.locked[0])
+    seen = {}
+    for name in SIGNALS:
+        if name in log:
+            channel = log[name].updates
+            inside = (channel.time >= short.time[0]) & (channel.time <= until)
+            noise = estimate_white_noise(channel.values) + _ROUNDING * np.abs(channel.values).max()
+            seen[name] = channel.time[inside], channel.values[inside], noise
+
+    def move(step: FloatArray) -> State:
+        values = np.array([start.output_speed, start.wheel_speed, start.twist]) + step
+        output, wheel, twist = values.tolist()
+        return State(ratio * output, output, wheel, twist, start.locked)
+
+    def misfit(step: FloatArray) -> FloatArray:
+        run = replace(short, start=move(step)).simulate()
+        signals = compute_run_signals(task.model, run)
+        left = [
+            (values - np.interp(time, run.time, signals[name])) / noise
+            for name, (time, values, noise) in seen.items()
+        ]
+        return np.nan_to_num(np.concatenate(left))
+
+    steps = np.diag([_STEP, _STEP / task.model.i_f, _STEP * _GRID])
+    first = misfit(np.zeros(len(steps)))
+    slopes = np.column_stack([misfit(step) - first for step in steps])
+    step = steps @ np.linalg.lstsq(slopes, -first, rcond=None)[0]
+    better = misfit(step) @ misfit(step) < first @ first
+    return move(step) if better else start
 
 
 def replace_run(before: Validation, twin: Twin, log: ShiftLog, run: Trajectory) -> Validation:
