@@ -171,6 +171,23 @@ def test_an_edited_parameter_file_drives_the_simulation(
     assert np.abs(softer[:, 1] - plain[:, 1]).max() > 50.0
 
 
+def test_a_parameter_file_under_other_labels_is_refused_without_its_template(
+    identified: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, twin = identified
+    template, exported = tmp_path / "labels.toml", tmp_path / "own.dcm"
+    template.write_text('[parameters.k_o]\nlabel = "Drv_cShaft"\n')
+    options = ["--template", str(template)]
+    assert main(["export", str(twin), "--to", "dcm", *options, "-o", str(exported)]) == 0
+    given = ["simulate", str(twin), str(log), "--parameters", str(exported)]
+    assert main([*given, *options]) == 0
+    capsys.readouterr()
+    assert main(given) == 2
+    reported = capsys.readouterr().err
+    assert "no entry is a parameter of the twin: Drv_cShaft" in reported
+    assert "give the --template" in reported
+
+
 def test_a_modelica_package_holds_the_shift_of_the_log(
     identified: tuple[Path, Path], tmp_path: Path
 ) -> None:

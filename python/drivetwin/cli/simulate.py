@@ -174,6 +174,12 @@ def _apply_parameters(twin: Twin, parameters: Path, template: Path | None) -> Tw
     if template is not None:
         content = restore_entries(content, collect_parameters(twin), read_template(template))
     update = update_twin(twin, content)
+    if len(update.unknown) == len(content.entries):
+        raise InputError(
+            f"no entry is a parameter of the twin: {', '.join(update.unknown) or 'no entries'}",
+            "give the --template by which the file was exported, or a file exported from this twin",
+            Where(file=str(parameters)),
+        )
     for text, names in (
         (f"{parameters.name} changes", update.changed or ("nothing",)),
         ("no simulation depends on", update.idle),

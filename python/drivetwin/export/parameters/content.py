@@ -383,7 +383,8 @@ def _refuse_twins(names: Iterable[tuple[str, str]]) -> None:
         if name in origins:
             raise InputError(
                 f"{origins[name]} and {origin} are both written as {name!r}",
-                "name the elements and gears of the vehicle card with few letters and digits",
+                "name elements and gears of the vehicle card with few letters and digits, and give "
+                "each label of a template once",
             )
         origins[name] = origin
 
