@@ -155,7 +155,7 @@ def _refine_start(task: DrivelineTask, log: ShiftLog, end: float) -> State:
             (values - np.interp(time, run.time, signals[name])) / noise
             for name, (time, values, noise) in seen.items()
         ]
-        return np.nan_to_num(np.concatenate(left))
+        return np.asarray(np.nan_to_num(np.concatenate(left)))
 
     steps = np.diag([_STEP, _STEP / task.model.i_f, _STEP * _GRID])
     first = misfit(np.zeros(len(steps)))
