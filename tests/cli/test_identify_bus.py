@@ -89,6 +89,18 @@ def test_strict_refuses_logs_of_which_too_little_follows(
     assert "2-3 contradicts the other shifts" in verdict.reason
 
 
+def test_a_ratio_of_no_gear_of_the_card_comes_first(
+    logs: list[Path], card: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(card.read_text(encoding="utf-8").replace("1.9", "2.1"), encoding="utf-8")
+    names = [str(one) for one in logs]
+    assert main(["identify", *names, "--vehicle", str(wrong), "--strict"]) == 3
+    verdict = " ".join(capsys.readouterr().out.partition("\n\n")[0].split())
+    assert "rests at ratios of no gear of the card (1 2.6, 2 2.1): 1.9" in verdict
+    assert "Enter the ratios of this gearbox" in verdict
+
+
 def test_an_output_torque_needs_a_vehicle_card(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -164,15 +164,18 @@ def explain_bus(
     findings: Sequence[Finding],
     predictions: Iterable[DecayPrediction | BusPredictionRecord],
 ) -> VerdictBlock:
-    """Build the verdict on a result, good if some quantities are identified and no shift
-    contradicts the others. A prediction that is no better than the trend alone is no test."""
+    """Build the verdict on a result, good if some quantities are identified, no shift contradicts
+    the others and the card has all ratios. A prediction that is no better than the trend alone is no test."""
     verdicts = [one.verdict for one in estimates.values()]
     count = verdicts.count(Verdict.IDENTIFIED)
     status = f"{count} of {len(verdicts)} quantities identified"
+    wrong_card = next((one for one in findings if one.code is Code.RATIO_UNKNOWN), None)
     contradictions = [one for one in findings if one.code is Code.BUS_SHIFTS_CONTRADICT]
-    if contradictions:
+    if wrong_card is not None:
+        reason, action, tone = wrong_card.cause, wrong_card.remedy, Tone.DOUBTFUL
+    elif contradictions:
         worst = min(contradictions, key=lambda one: one.numbers["p"].value)
-        reason = f"{len(contradictions)} times a shift contradicts the others. {worst.cause}"
+        reason = f"Contradictions between shifts: {len(contradictions)}. {worst.cause}"
         action, tone = worst.remedy, Tone.DOUBTFUL
     else:
         reason, action, tone = _explain_agreement(estimates, count)
