@@ -257,6 +257,8 @@ def test_front_and_map_are_in_the_files(
         (("--shift", "2"), "does not name two gears"),
         (("--shift", "2-7"), "has no gear '7'"),
         (("--shift", "2-3", "--system-pressure", "2"), "system pressure is 2.00 bar"),
+        (("--shift", "2-3", "--system-pressure", "1400"), "less than or equal to 100"),
+        (("--shift", "2-3", "--wheel-radius", "318"), "less than or equal to 2"),
     ],
 )
 def test_refusals(

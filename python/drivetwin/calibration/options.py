@@ -60,11 +60,14 @@ class ShiftOptions(Request):
 
     engine_torque: float | None = option("Engine torque at the shift request.", unit=NM)
     engine_speed: float | None = option("Engine speed at the shift request.", unit=RPM)
-    system_pressure: float | None = option("Pressure of a held element.", unit=BAR)
+    system_pressure: float | None = option(
+        "Pressure of a held element.", unit=BAR, minimum=0.0, maximum=100.0
+    )
     wheel_radius: float | None = option(
         f"Dynamic tyre radius; by default that of the vehicle card, else {USUAL_WHEEL_RADIUS}.",
         unit=METRE,
         minimum=0.05,
+        maximum=2.0,
     )
     engine_lag: float = option(
         "Lag of the engine torque behind its command.",

@@ -103,7 +103,7 @@ def _require_pressure(needed: Mapping[str, float], system_pressure: float) -> No
             raise InputError(
                 f"{name} needs {format_with_unit(pressure, 'Pa', digits=3)} in this shift, the "
                 f"system pressure is {format_with_unit(system_pressure, 'Pa', digits=3)}",
-                "give a smaller engine torque, or a larger system pressure",
+                "give a smaller engine torque or engine speed, or a larger system pressure",
             )
 
 
