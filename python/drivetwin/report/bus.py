@@ -164,8 +164,11 @@ def explain_bus(
     findings: Sequence[Finding],
     predictions: Iterable[DecayPrediction | BusPredictionRecord],
 ) -> VerdictBlock:
-    """Build the verdict on a result, good if some quantities are identified, no shift contradicts
-    the others and the card has all ratios. A prediction that is no better than the trend alone is no test."""
+    """Build the verdict on a result.
+
+    It is good if some quantities are identified, no shift contradicts the others and the card has
+    all ratios. A prediction that is no better than the trend alone is no test.
+    """
     verdicts = [one.verdict for one in estimates.values()]
     count = verdicts.count(Verdict.IDENTIFIED)
     status = f"{count} of {len(verdicts)} quantities identified"
