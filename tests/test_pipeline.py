@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import drivetwin
@@ -17,6 +18,7 @@ from drivetwin.dyno.scenario_file import load_scenario
 from drivetwin.errors import InputError, PlausibilityError
 from drivetwin.estimation.result.estimate import Verdict
 from drivetwin.findings import Code
+from drivetwin.plausibility.friction import check_torque_signs
 from drivetwin.vehicle.spec import PriorValue
 
 
@@ -103,6 +105,29 @@ def test_torques_that_count_against_the_acceleration_are_refused(
     with pytest.raises(PlausibilityError, match="'EngTrq' falls where the vehicle") as refusal:
         drivetwin.identify(replace(contrary, channels=kept), card, shifts)
     assert 'source = "EngTrq", sign = -1' in refusal.value.remedy
+
+
+@pytest.mark.parametrize("without", ["wheel_speed", "engine_torque"])
+def test_a_shaft_that_rings_after_a_shift_is_no_reversed_torque(
+    data: tuple[Any, Any, Any], without: str
+) -> None:
+    """While it rings, its torque brakes the gearbox and accelerates the wheel."""
+    log, card, _ = data
+    time = np.arange(0.0, 6.0, 2e-3)
+    ring = np.exp(-time) * np.sin(2.0 * np.pi * 2.2 * time)
+    output, wheel = (60.0 + 1.5 * time + amount * ring for amount in (-0.6, 0.03))
+    values = {
+        "input_speed": card.compute_ratio("3") * output,
+        "output_speed": output,
+        "wheel_speed": wheel / card.final_drive.value,
+        "output_torque": 2000.0 + 30.0 * np.gradient(ring, time),
+    }
+    channels = {
+        role: replace(log[role], time=time, values=one)
+        for role, one in values.items()
+        if role != without
+    }
+    assert not list(check_torque_signs(replace(log, channels=channels), card))
 
 
 @pytest.mark.parametrize(

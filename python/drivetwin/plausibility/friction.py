@@ -57,12 +57,17 @@ def compute_engine_rate(log: ShiftLog, card: VehicleCard, span: Span) -> float:
     )
 
 
-def compute_output_rate(log: ShiftLog, card: VehicleCard, span: Span) -> float:
-    """ω_out' over a span [rad/s^2], of the output speed or, without it, of the wheel speed."""
-    if "output_speed" in log:
-        return compute_slope(log["output_speed"], span)
-    if "wheel_speed" in log:
-        return card.final_drive.value * compute_slope(log["wheel_speed"], span)
+def compute_output_rate(
+    log: ShiftLog,
+    card: VehicleCard,
+    span: Span,
+    roles: Sequence[str] = ("output_speed", "wheel_speed"),
+) -> float:
+    """ω_out' over a span [rad/s^2], of the first of the speeds `roles` that the log has."""
+    for role in roles:
+        if role in log:
+            ratio = card.final_drive.value if role == "wheel_speed" else 1.0
+            return ratio * compute_slope(log[role], span)
     return np.nan
 
 
@@ -364,16 +369,18 @@ def check_torque_signs(log: ShiftLog, card: VehicleCard) -> Iterator[Finding]:
     """Report each torque that falls where the vehicle accelerates more, in gear.
 
     Changes from one half window to the next are compared: a slope of the road changes slowly, a
-    pedal fast.
+    pedal fast. After a shift the shaft rings: its torque accelerates the wheel and brakes the
+    gearbox, so that the output torque is compared with the wheel alone.
     """
     spans = find_gear_spans(log, card)
-    for role in ("engine_torque", "output_torque"):
+    speeds = {"engine_torque": ("wheel_speed", "output_speed"), "output_torque": ("wheel_speed",)}
+    for role, used in speeds.items():
         changes = []
         for gear, (first, last) in spans if role in log else []:
             windows = list(pairwise(np.arange(first, last, 0.5 * WINDOW)))
             ratio = card.compute_ratio(gear) if role == "engine_torque" else 1.0
             torques = [ratio * compute_mean(log[role], one) for one in windows]
-            rates = [compute_output_rate(log, card, one) for one in windows]
+            rates = [compute_output_rate(log, card, one, used) for one in windows]
             changes.append(np.diff([torques, rates]))
         torque, rate = np.nan_to_num(np.hstack([np.zeros((2, 0)), *changes]))
         size = float(np.sqrt(np.sum(torque**2) * np.sum(rate**2)))

@@ -18,6 +18,7 @@ from drivetwin.estimation.likelihood.selection.plants import (
     drop_effect,
     extend_problem,
 )
+from drivetwin.estimation.likelihood.uncertainty.derived_parameters import differentiate
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.effects import EffectId, EffectPrior
 from drivetwin.vehicle.spec import PriorValue
@@ -102,6 +103,21 @@ def test_an_idle_drum_turns_with_the_shift() -> None:
     posed, point = _add_idle_drum()
     assert posed.terms[0].plant.build_model(point).elements[2].drum_inertia == 0.2
     _assert_exact(posed, point, ["K2.drum"])
+
+
+def test_a_drum_without_inertia_has_one_sided_derivatives() -> None:
+    """A fit may end at the bound of a drum, beyond which there is no driveline."""
+    posed, point = problem(bench())
+    drum = point.names.index("B3.drum") if "B3.drum" in point.names else 0
+    values = np.where(np.arange(point.values.size) == drum, posed.lower, point.values)
+
+    def compute(at: Any) -> dict[str, float]:
+        assert (at.values >= posed.lower).all()
+        return {"square": float(at.values[drum]) ** 2 + float(at.values[drum])}
+
+    std = np.full(values.size, 1e-3)
+    found = differentiate(compute, point.replace_values(values), std, posed)
+    assert found[0, drum] == pytest.approx(1.0 + 2.0 * posed.lower[drum], abs=1e-4)
 
 
 @pytest.mark.parametrize("effect", RIGID)

@@ -420,7 +420,7 @@ def _linearise(found: Identification) -> _Linearisation:
     def compute(at: ParameterVector) -> dict[str, float]:
         return compute_parameters(fit.problem, at, signals, slips)
 
-    slopes = differentiate(compute, fit.point, np.sqrt(np.diag(fit.covariance)))
+    slopes = differentiate(compute, fit.point, np.sqrt(np.diag(fit.covariance)), fit.problem)
     return _Linearisation(fit, compute(fit.point), slopes)
 
 

@@ -298,7 +298,8 @@ def _fit_parameters(
         return {**compute_parameters(fit.problem, at, signals, slips), **laws}
 
     every = compute(corrected.mean)
-    both = differentiate(compute, corrected.mean, np.sqrt(np.diag(fit.covariance)))
+    std = np.sqrt(np.diag(fit.covariance))
+    both = differentiate(compute, corrected.mean, std, fit.problem)
     joint = JointCovariance(tuple(every), both @ corrected.covariance @ both.T)
     values = compute_parameters(fit.problem, corrected.mean, signals, slips)
     matrix, covariance = both[: len(values)], joint.covariance[: len(values), : len(values)]

@@ -132,25 +132,31 @@ def compute_jacobian(
 ) -> FloatArray:
     """Compute the derivative (q, p) of the parameters by central differences over a part of
     `std` (p,)."""
-    return differentiate(lambda at: compute_parameters(problem, at, signals), point, std)
+    return differentiate(lambda at: compute_parameters(problem, at, signals), point, std, problem)
+
+
+_LEAST_STEP = 1e-8
+"""Step over the value where its standard deviation is rounding [ratio]."""
 
 
 def differentiate(
     function: Callable[[ParameterVector], Mapping[str, float]],
     point: ParameterVector,
     std: FloatArray,
+    problem: DualClutchProblem,
 ) -> FloatArray:
     """Compute the derivative (q, p) of quantities by central differences over a part of `std`
-    (p,)."""
+    (p,), one-sided at a bound of the `problem`."""
     columns = []
-    for k, width in enumerate(0.01 * std):
+    for k, width in enumerate(np.maximum(0.01 * std, _LEAST_STEP * np.abs(point.values))):
         shift = np.zeros_like(std)
         shift[k] = width
+        high = np.minimum(point.values + shift, problem.upper)
+        low = np.maximum(point.values - shift, problem.lower)
         ahead, behind = (
-            np.array(list(function(point.replace_values(x)).values()))
-            for x in (point.values + shift, point.values - shift)
+            np.array(list(function(point.replace_values(x)).values())) for x in (high, low)
         )
-        columns.append((ahead - behind) / (2.0 * width))
+        columns.append((ahead - behind) / (high[k] - low[k]))
     return np.column_stack(columns)
 
 

@@ -20,6 +20,7 @@ from drivetwin.estimation.likelihood.uncertainty.derived_parameters import diffe
 from drivetwin.estimation.result.cause import SHOWN, Group
 from drivetwin.estimation.result.estimate import Z95, FrictionCurve, Verdict
 from drivetwin.findings import Code, explain
+from drivetwin.likelihood.point import ParameterVector
 from drivetwin.simulation.dual_clutch import Stribeck
 from drivetwin.vehicle.effects import EffectId
 from drivetwin.vehicle.spec import PriorValue
@@ -80,9 +81,11 @@ def _get_law(
         if name in (one.name for one in term.plant.elements)
     )
     std = np.sqrt(np.diag(fit.covariance))
-    rows = differentiate(
-        lambda at: dict(zip(LAW, structure.get_law(at, name), strict=True)), correction.mean, std
-    )
+
+    def compute(at: ParameterVector) -> dict[str, float]:
+        return dict(zip(LAW, structure.get_law(at, name), strict=True))
+
+    rows = differentiate(compute, correction.mean, std, fit.problem)
     return np.array(structure.get_law(correction.mean, name)), rows
 
 
