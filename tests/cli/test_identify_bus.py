@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -99,6 +100,23 @@ def test_a_ratio_of_no_gear_of_the_card_comes_first(
     verdict = " ".join(capsys.readouterr().out.partition("\n\n")[0].split())
     assert "rests at ratios of no gear of the card (1 2.6, 2 2.1): 1.9" in verdict
     assert "Enter the ratios of this gearbox" in verdict
+
+
+def test_a_clutch_is_open_from_the_first_slip_though_the_slip_swings_through_zero(
+    tmp_path: Path, card: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = write_log(tmp_path / "swing.csv", 1)
+    head, *rows = log.read_text(encoding="utf-8").splitlines()
+    lines = [f"{head},engine_speed [rpm]"]
+    for row in rows:
+        time, inlet = map(float, row.split(",")[:2])
+        slip = 200.0 * math.sin(10.0 * math.pi * (time - 0.9)) if 0.9 < time < 1.5 else 0.0
+        lines.append(f"{row},{inlet + slip:.6g}")
+    log.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert main(["shifts", str(log), "--vehicle", str(card), "--json"]) == 0
+    (shift,) = json.loads(capsys.readouterr().out)["shifts"]
+    phases = {one["name"]: one["span"] for one in shift["phases"]}
+    assert phases["clutch opens"][0] == pytest.approx(0.92, abs=0.021)
 
 
 def test_an_output_torque_needs_a_vehicle_card(

@@ -259,12 +259,16 @@ class _Part:
             listed = [(PhaseName.BETWEEN_GEARS, (leaves, reaches))]
             listed.append((PhaseName.ENGAGED, (reaches, closed)))
         else:
-            time = slip.time
-            before = slip.is_open & (time <= leaves)
-            opens = leaves
-            if before.any():
-                run = find_true_runs(before)[-1]
-                opens = float(time[run[0]]) if time[run[1] - 1] > leaves - 0.1 else leaves
+            # A slip that swings through zero is that of an open clutch.
+            time, count = slip.time, int(np.searchsorted(slip.time, leaves, side="right"))
+            shut = [
+                stop
+                for first, stop in find_true_runs(~slip.is_open[:count])
+                if time[stop - 1] - time[first] >= SETTINGS.max_dropout
+            ]
+            first_open = shut[-1] if shut else 0
+            opened = slip.is_open[first_open:count].any()
+            opens = float(time[first_open]) if opened else leaves
             closes = self._find_closing(reaches, closed)
             listed = [
                 (PhaseName.CLUTCH_OPENS, (opens, leaves)),
