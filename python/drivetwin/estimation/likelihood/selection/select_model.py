@@ -69,9 +69,9 @@ from drivetwin.vehicle.spec import PriorValue
 class SelectionSettings:
     """Settings of the model selection; work is counted in passes over the log."""
 
-    max_work: float = 1000.0
-    """Work of the search: three rounds from draws, a fit that succeeds takes 100 to 800; beyond, an
-    element is missing or the card is wrong [passes]."""
+    max_work: float = 2000.0
+    """Work of the search: three rounds from draws. A fit that succeeds takes 100 to 800, in one of
+    a hundred made logs up to 2,000; beyond, an element is missing or the card is wrong [passes]."""
     max_restricted_work: float = MAX_REFIT_WORK
     """Work of the search that starts from a minimum of the wider model: it takes 160 passes
     [passes]."""
