@@ -173,5 +173,6 @@ def test_a_controller_has_the_speeds_of_the_sensors() -> None:
     assert (np.ptp(run(quantum=1e4)[0], axis=1) == 0.0).all()
     noisy, again = run(noise=0.3)[0], run(noise=0.3)[0]
     np.testing.assert_array_equal(noisy, again)
-    assert 0.0 < np.abs(noisy - exact).max() < 0.5 * np.ptp(exact)
+    # The intervention ramps in two tasks; noise moves its start by one of them.
+    assert 0.0 < np.abs(noisy - exact).max() <= 0.5 * np.ptp(exact)
     assert (run(period=0.04)[1] >= begin).all()
