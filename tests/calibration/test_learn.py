@@ -16,6 +16,7 @@ from drivetwin.channels.roles import Quantity
 from drivetwin.channels.shiftlog import Channel
 from drivetwin.errors import IdentificationError
 from drivetwin.estimation.identification import OIL_TEMPERATURE
+from drivetwin.estimation.result.estimate import Estimate, Verdict
 from drivetwin.logs.read import read_log
 from drivetwin.simulation.dual_clutch import DualClutch
 from drivetwin.twin.twin import Twin
@@ -86,6 +87,25 @@ def test_the_corrected_twin_has_narrower_intervals_and_only_simulated_values(
         for gear in "23"
     ]
     assert engine[0] == pytest.approx(engine[1], rel=1e-3)
+
+
+def test_a_final_drive_that_the_card_has_exactly_contradicts_no_log(
+    twin: Twin, tmp_path: Path
+) -> None:
+    """Its standard deviation is that of rounding, and so is the change by a log."""
+    assert twin.covariance is not None
+    ratio = twin.final_drive
+    exact = Estimate("i_f", ratio * (1.0 + 1e-14), 1e-16 * ratio, Verdict.DESIGN, "card")
+    row = np.zeros((1, len(twin.covariance_ids)))
+    covariance = np.block([[twin.covariance, row.T], [row, np.array([[(1e-16 * ratio) ** 2]])]])
+    stated = replace(
+        twin,
+        parameters={**twin.parameters, "i_f": exact},
+        covariance_ids=(*twin.covariance_ids, "i_f"),
+        covariance=covariance,
+    )
+    found = correct(stated, tmp_path, build_model(twin), (1,))
+    assert "eta" in {one.id for one in found.values}
 
 
 def test_a_log_of_another_vehicle_is_refused_with_the_value_that_contradicts(

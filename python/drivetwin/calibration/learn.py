@@ -225,7 +225,10 @@ def _describe_unit(twin: Twin, shift: Shift, spread: Spread | None = None) -> Mo
     scatter = 0.0 if spread is None else _compute_scatter(known, spread)
     covariance = known.covariance + scatter
     laws = [make_law_id(shift.oncoming, key) for key in LAW_KEYS]
-    kept = [k for k, one in enumerate(known.ids) if one in (*ids, *laws) and covariance[k, k] > 0.0]
+    known_to_rounding = np.sqrt(np.diag(covariance)) <= LEAST_AXIS * np.abs(known.values)
+    kept = [
+        k for k, one in enumerate(known.ids) if one in (*ids, *laws) and not known_to_rounding[k]
+    ]
     return replace(
         known,
         ids=tuple(known.ids[k] for k in kept),
