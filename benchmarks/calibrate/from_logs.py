@@ -38,7 +38,7 @@ from drivetwin.calibration.calibrate import Task, build_objective, find_best, ma
 from drivetwin.calibration.learn import correct_twin
 from drivetwin.calibration.maneuver import Profiles
 from drivetwin.calibration.metrics import Metric, Outcome
-from drivetwin.calibration.objective import CalibrationSettings, Objective
+from drivetwin.calibration.objective import CalibrationSettings, Hardware, Objective
 from drivetwin.calibration.options import PolicyKind
 from drivetwin.calibration.policy import Space
 from drivetwin.calibration.polish import polish
@@ -85,6 +85,8 @@ _LAST = replace(_LIGHT, starts=0, tail_iterations=10)
 """Settings after the last log: a shorter polish from the best calibration so far."""
 _WARM = replace(_LAST, tail_draws=128)
 """Settings on the way: fewer draws."""
+_UNBOUND = Hardware(*(3 * [float("inf")]))
+"""No limits of hardware: those of a corrected twin follow its torque, and the optimum has none."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,7 @@ class Trial:
 def learn_vehicle(made: MadeVehicle, given: argparse.Namespace) -> Trial:
     """Calibrate one vehicle from its logs, and find the optimum on its true units."""
     request = made.build_request(PolicyKind.CONTROLLER, _LIGHT.scale_effort(given.effort))
+    request = replace(request, hardware=_UNBOUND)
     task = build_task(made.twin, request)
     limits = tuple(one for one in task.limits if one.metric is Metric.SHIFT_TIME)
     request, task = replace(request, limits=limits), task.set_limits(limits)
