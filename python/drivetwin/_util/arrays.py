@@ -54,7 +54,7 @@ def remember_for_arrays(function: Callable[P, Result]) -> Callable[P, Result]:
     return remembered
 
 
-_NEGLIGIBLE = 1e-9
+NEGLIGIBLE = 1e-9
 """Variance of a direction over the largest below which it is rounding [ratio]."""
 
 
@@ -67,7 +67,7 @@ def compute_directions(covariance: FloatArray) -> FloatArray:
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     unit = covariance / np.outer(*(np.where(scale > 0.0, scale, np.inf),) * 2)
     power, axes = np.linalg.eigh(unit)
-    kept = power > _NEGLIGIBLE * max(1.0, float(power[-1]))
+    kept = power > NEGLIGIBLE * max(1.0, float(power[-1]))
     return np.asarray(scale[:, None] * axes[:, kept] * np.sqrt(power[kept]))
 
 

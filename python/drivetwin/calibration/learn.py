@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from drivetwin._util.arrays import FloatArray
-from drivetwin.calibration.spread import LEAST_AXIS, OilFriction, Spread, WarmUnit, warm_twin
+from drivetwin._util.arrays import NEGLIGIBLE, FloatArray
+from drivetwin.calibration.spread import OilFriction, Spread, WarmUnit, warm_twin
 from drivetwin.channels.roles import get_pressure_element
 from drivetwin.channels.shiftlog import ShiftLog
 from drivetwin.errors import IdentificationError, Where
@@ -55,6 +55,9 @@ _DELAYS = 3
 _FAR = 5.0
 """Standard deviations of made units from which a value is one of another vehicle: one of 2 million
 units is as far."""
+_ROUNDED = 1e-9
+"""Standard deviation over the value up to which a number is known to rounding: an exact ratio of a
+card has 6e-13, the final drive 1e-16 [ratio]."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +228,7 @@ def _describe_unit(twin: Twin, shift: Shift, spread: Spread | None = None) -> Mo
     scatter = 0.0 if spread is None else _compute_scatter(known, spread)
     covariance = known.covariance + scatter
     laws = [make_law_id(shift.oncoming, key) for key in LAW_KEYS]
-    known_to_rounding = np.sqrt(np.diag(covariance)) <= LEAST_AXIS * np.abs(known.values)
+    known_to_rounding = np.sqrt(np.diag(covariance)) <= _ROUNDED * np.abs(known.values)
     kept = [
         k for k, one in enumerate(known.ids) if one in (*ids, *laws) and not known_to_rounding[k]
     ]
@@ -242,7 +245,7 @@ def _list_sums(unit: ModelDistribution) -> Iterator[SumPrior]:
     scale = np.sqrt(np.diag(unit.covariance))
     power, axes = np.linalg.eigh(unit.covariance / np.outer(scale, scale))
     for one, axis in zip(power, axes.T, strict=True):
-        if one > LEAST_AXIS * power[-1]:
+        if one > NEGLIGIBLE * power[-1]:
             factors = dict(zip(unit.ids, (axis / scale).tolist(), strict=True))
             yield SumPrior(factors, float(axis / scale @ unit.values), float(np.sqrt(one)))
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from drivetwin._util.arrays import FloatArray
+from drivetwin._util.arrays import NEGLIGIBLE, FloatArray
 from drivetwin.errors import InputError
 from drivetwin.estimation.identification import OIL_TEMPERATURE
 from drivetwin.parameters import LAW_KEYS
@@ -184,7 +184,7 @@ class WarmUnit:
         )
         prior = self.unit.covariance[np.ix_(own, own)]
         scale = np.sqrt(np.diag(prior))
-        inverse = np.linalg.pinv(prior / np.outer(scale, scale), LEAST_AXIS, hermitian=True)
+        inverse = np.linalg.pinv(prior / np.outer(scale, scale), NEGLIGIBLE, hermitian=True)
         gain = inverse @ (self.common[own] / scale) / scale
         posterior = found.covariance[np.ix_(other, other)]
         less = float(gain @ (prior - posterior) @ gain)
@@ -192,10 +192,6 @@ class WarmUnit:
         std = float(np.sqrt(np.clip(self.oil.std**2 - less, 0.0, self.oil.std**2)))
         common = found.covariance[:, other] @ gain
         return WarmUnit(found, replace(self.oil, slope=slope, std=std), common)
-
-
-LEAST_AXIS = 1e-9
-"""Variance of a direction of a unit over the largest below which it is rounding [ratio]."""
 
 
 def warm_twin(twin: Twin, factor: float) -> Twin:

@@ -136,7 +136,7 @@ def compute_jacobian(
 
 
 _LEAST_STEP = 1e-8
-"""Step over the value where its standard deviation is rounding [ratio]."""
+"""Step over the value where its standard deviation is rounding: root of the rounding [ratio]."""
 
 
 def differentiate(
